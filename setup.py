@@ -43,7 +43,6 @@ COMPILED = (
     "wam_control/contact/momentum_observer.py",
     "wam_control/task/motion.py",
     "wam_control/contact/shaft_friction.py",
-    "wam_control/contact/tool_load.py",
     "wam_control/velocity/transform.py",
     "wam_control/contact/velocity_fit.py",
     "wam_control/velocity/velocity_loop.py",

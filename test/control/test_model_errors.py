@@ -19,13 +19,14 @@ from wam_description.signals import State
 TRUE = np.array([0.3, -0.2, 0.1])
 SD = 0.25
 STAYS = np.zeros((2, 0))  # torques of errors of the rest that stay: none
+LEAST = 1e-6  # N^2 m^2, of the noise of a motor
 QUIET = 1.0  # a detection statistic without contact
 
 
 def errors(drift: float = 0.0, noise: float = 0.0) -> ModelErrors:
     variance = np.full(3, SD**2)
     prior = ModelPrior(("a", "b", "c"), np.zeros(3), np.diag(variance), variance, np.full(3, 0.2))
-    return ModelErrors(prior, drift, np.diag([30.0, 20.0]), np.full(2, noise**2))
+    return ModelErrors(prior, drift, np.diag([30.0, 20.0]), np.full(2, noise**2), LEAST)
 
 
 def seen(random: np.random.Generator, external: tuple[float, float] = (0.0, 0.0)) -> Observation:
@@ -130,6 +131,17 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.3, rel=0.3)
 
 
+def test_errors_of_a_shaft_whose_friction_is_uncertain_show_no_noise_of_its_motor() -> None:
+    """Twice what is stated at every second sample; as noise they would hide contacts in all of the motion."""
+    tracked, random = errors(noise=0.005), np.random.default_rng(3)
+    for k in range(2000):
+        stated, times = (0.5, 2.0) if k % 2 else (0.05, 1.0)
+        residual, pose = times * stated * random.standard_normal(2), random.uniform(-1.0, 1.0, 2)
+        moment = Observation(residual, np.zeros((2, 3)), stated**2 * np.eye(2), np.ones(2), pose, STAYS)
+        tracked.follow(moment, QUIET, False, CONTACT.learn_interval)
+    assert np.all(np.sqrt(tracked.noise) < 0.05 / np.array([30.0, 20.0]))
+
+
 @pytest.mark.slow
 def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_rest() -> None:
     def rough(tracked: ModelErrors, times: float, count: int, in_contact: bool = False, moving: float = 1.0) -> None:
@@ -161,7 +173,7 @@ def test_only_an_error_that_is_certainly_large_is_named() -> None:
         prior = ModelPrior(
             ("a", "b", "c"), np.array([0.3, -0.4, 0.1]), certainty * np.diag(variance), variance, np.full(3, 0.2)
         )
-        assert ModelErrors(prior, 0.0, np.eye(2), np.zeros(2)).beyond == named
+        assert ModelErrors(prior, 0.0, np.eye(2), np.zeros(2), LEAST).beyond == named
     tracked = errors()
     assert tracked.beyond == []
     follow(tracked, 400)
@@ -240,6 +252,7 @@ def test_the_identified_covariance_is_that_of_masses_and_load_too_with_what_they
     least = np.diag([0.02**2] * 3 + [0.0] * 3)
     assert prior.covariance[np.ix_(at, at)] == pytest.approx(rows @ covariance @ rows.T + least)
     assert prior.errors[at] == pytest.approx([0.0, 0.0, 0.0, 0.03, 0.0, 0.0])
+    assert prior.limit[at[3:]] == pytest.approx(prior.covariance[at[3:], at[3:]]), "of these only friction drifts"
     others = np.delete(np.arange(len(prior.names)), at)
     wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
     assert np.array_equal(prior.covariance[np.ix_(others, others)], wide.covariance[np.ix_(others, others)])

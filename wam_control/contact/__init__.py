@@ -16,7 +16,6 @@
 ``observer_parameters``     its parameters
 ``shaft_friction``          nominal friction of motors and joints, and where it is uncertain
 ``thresholds``              what no parameter sets: when a contact is detected, how it may move
-``tool_load``               torques of a mass at the tool
 ``velocity_fit``            velocities of the motors from their angles
 ==========================  ================================================================================
 """

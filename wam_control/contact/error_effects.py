@@ -1,6 +1,7 @@
 """How the errors of the nominal model act on the torques that an observer of the motors sees."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,47 +9,70 @@ from numpy.typing import NDArray
 from wam_control.contact.model_errors import Observation
 from wam_control.contact.motor_side import MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.shaft_friction import DISTANCE_VARIANCE, DISTANCE_WEIGHTS, EQUAL, LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
+from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-Means = tuple[Array, Array, Array, Array]
+INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of an inertia
 
 
-class CentreEffects:
-    """Apparent external torques of links whose centres of mass differ from the model.
+class FilteredMotion(NamedTuple):
+    """What an observer filters, all by the same filter.
+
+    Attributes
+    ----------
+    residual, model : (n,), N m, the residual and the torque of the model.
+    pose, velocity, acceleration : (n,), rad, rad/s, rad/s^2, of the joints.
+    signals : of the shafts; empty with joint sensors.
+    """
+
+    residual: Array
+    model: Array
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    signals: Array
+
+
+class LinkEffects:
+    """Apparent external torques of links whose centres of mass differ from the model, and of a mass at the tool.
 
     Parameters
     ----------
-    body : the links as modelled.
+    arm, body : the arm as modelled, and its links.
     masses : of the links, (n,), kg.
     """
 
-    def __init__(self, body: RigidBody, masses: Sequence[float]) -> None:
+    def __init__(self, arm: Arm, body: RigidBody, masses: Array) -> None:
         n = len(masses)
-        self._body, self._masses, self._still = body, np.repeat(masses, 3), np.zeros(n)
-        self._columns = np.array([10 * i + 1 + axis for i in range(n) for axis in range(3)])
+        self._body, tool = body, np.array(arm.tool)
+        inertia = tool @ tool * np.eye(3) - np.outer(tool, tool)
+        self._per_error = np.zeros((10 * n, 3 * n + 1))
+        for i, mass in enumerate(masses):
+            self._per_error[10 * i + 1 : 10 * i + 4, 3 * i : 3 * i + 3] = -mass * np.eye(3)
+        self._per_error[10 * n - 10 :, -1] = -np.array([1.0, *tool, *inertia[INERTIA]])
 
-    def at(self, pose: Array) -> Array:
-        """Torques, (n, 3 n), N, per m of the centres' coordinates in the frames of their links, in a pose (n,), rad."""
-        regressor = self._body.inverse_dynamics_regressor(pose, self._still, self._still)
-        return -regressor.take(self._columns, axis=1) * self._masses
+    def of(self, motion: FilteredMotion) -> Array:
+        """Torques, (n, 3 n + 1), per m of the centres' coordinates in the frames of their links, and per kg."""
+        return self._body.inverse_dynamics_regressor(*motion[2:5]).dot(self._per_error)
 
 
 class GaugeEffects:
     """Effects of masses, centres and payload on the torques of joint sensors, and the covariance of the gauges."""
 
-    def __init__(self, n: int, parameters: ObserverParameters, centres: CentreEffects) -> None:
+    def __init__(self, n: int, parameters: ObserverParameters, links: LinkEffects) -> None:
         self._lasting = np.diag(np.full(n, parameters.joint_torque_sd))
         self._rest, self._still = np.square(self._lasting), np.zeros(n)
-        self._centres, self._payload = centres, parameters.payload[0]
+        self._links, self._payload = links, parameters.payload[0]
 
-    def observation(self, means: Means, load: Array | None, *_: object) -> Observation:
+    def observation(self, motion: FilteredMotion, *_: object) -> Observation:
         """See `ErrorEffects.observation`."""
-        residual, model, pose = means[:3]
-        added = self._still if load is None else load
-        effects = np.hstack((np.diag(model), self._centres.at(pose), added[:, None]))
-        return Observation(residual - self._payload * added, effects, self._rest, self._still, pose, self._lasting)
+        still = motion._replace(velocity=self._still, acceleration=self._still)
+        effects = np.hstack((np.diag(motion.model), self._links.of(still)))
+        residual = motion.residual - self._payload * effects[:, -1]
+        return Observation(residual, effects, self._rest, self._still, motion.pose, self._lasting)
 
 
 class ErrorEffects:
@@ -60,7 +84,7 @@ class ErrorEffects:
     parameters : the uncertainty of the nominal model.
     times : time constants of the observer's filters, s.
     has_dither : whether torques and signals are means over a cycle of a dither.
-    centres : effects of the centres of mass.
+    links : effects of centres of mass and payload.
     """
 
     def __init__(
@@ -69,57 +93,67 @@ class ErrorEffects:
         parameters: ObserverParameters,
         times: Sequence[float],
         has_dither: bool,
-        centres: CentreEffects,
+        links: LinkEffects,
     ) -> None:
-        inverse, motors, joints = side.map.motor_from_joint, side.motors, side.joints
+        inverse, friction = side.map.motor_from_joint, side.friction
         n = self._n = len(inverse)
         self._from_motors, self._parameters, self._times = side.map.joint_from_motor, parameters, times
-        levels = 0.5 * np.array([*motors.dynamic, *joints.dynamic])
-        statics = np.array([*motors.static, *joints.static])
-        self._sds = np.concatenate((parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics))
+        self._sds = parameters.rest_uncertainty * friction.static, parameters.shape_uncertainty * friction.static
+        self._dynamic, levels = friction.dynamic, 0.5 * friction.dynamic
         through = self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
         # the same of the errors of the model per signal
-        self._errors = np.hstack((-through * levels, through * levels, np.eye(n), -through, inverse.T))
-        self._to_joints, self._has_dither, self._centres = inverse.T, has_dither, centres
+        self._errors = np.hstack((-through * levels, through * levels, np.eye(n), -through))
+        # with the model, the constants were identified that motors have in common that move the same joints
+        driven = self._from_motors != 0.0
+        common = (driven.T.astype(float) @ driven > 0.0).astype(float) * side.is_identified
+        self._differs = np.eye(n) - common / np.maximum(1.0, common.sum(axis=1))
+        self._to_joints, self._has_dither, self._links = inverse.T, has_dither, links
 
     def observation(
-        self, means: Means, load: Array | None, inertia: Array, velocity_sd: Sequence[float], which: int
+        self, motion: FilteredMotion, inertia: Array, velocity_sd: Sequence[float], which: int
     ) -> Observation:
         """The residual, the effects of the errors on it, and the covariance of the rest.
 
         Parameters
         ----------
-        means : filtered residual and torque of the model, N m, pose, rad, each (n,); signals of the shafts, (11 n,).
-        load : (n,), torques of a mass of 1 kg at the tool, through the same filter; None where not followed.
+        motion : with the signals of the shafts.
         inertia : (n, n), kg m^2.
         velocity_sd : of the motors' velocities, (n,), rad/s.
         which : of the filters.
         """
         n, given, time = self._n, self._parameters, self._times[which]
-        residual, model, pose, signals = means
-        sliding, moving, uncertain = signals[: 2 * n], signals[2 * n : 4 * n], signals[4 * n : 8 * n]
+        residual, model, signals = motion.residual, motion.model, motion.signals
+        at = 2 * n * len(LOG_DISTANCES)
+        by_distance = signals[:at].reshape(2 * n, -1)
+        moving, resting, slow, loaded = signals[at : at + 8 * n].reshape(4, -1)
+        sliding = by_distance.dot(EQUAL)
         if self._has_dither:
             # a shaft that slips in both directions within a cycle passes at its stops from one limit of its friction to
             # the other: what it slips further in one of them is all that is left of both
-            resting, shape = uncertain.reshape(2, -1)
             uneven = np.abs(sliding)
             both_ways = np.maximum(1.0 - resting - uneven, 0.0)
-            unknown = np.maximum(1.0 - both_ways / CONTACT.slips_both_ways, uneven)
-            uncertain = np.concatenate((resting * unknown, np.minimum(shape, uneven)))
+            resting = resting * np.maximum(1.0 - both_ways / CONTACT.slips_both_ways, uneven)
+            slow = np.minimum(slow, uneven)
+        # friction by presliding distance: what is linear in its logarithm is tracked, the rest is not
+        slope = by_distance.dot(DISTANCE_WEIGHTS)
+        curved = np.maximum(
+            0.0, np.square(by_distance).dot(EQUAL) - sliding * sliding - slope * slope * DISTANCE_VARIANCE
+        )
         modelled = self._from_motors.T.dot(model)
-        driving = modelled - self._from_motors.T.dot(residual)
-        effects = np.zeros((n, 11 * n + 2))
-        sizes = np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n : 10 * n], driving))
-        np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
-        effects[:, 8 * n : -2] = self._centres.at(pose)
-        effects[:, -2] = self._to_joints.dot(signals[10 * n :])
-        if load is not None:
-            effects[:, -1] = load
-            residual = residual - given.payload[0] * load
-        variance = np.square(self._sds * uncertain).reshape(2, -1).sum(axis=0)
+        effects = np.zeros((n, 13 * n + 2))
+        sizes = np.concatenate((moving + sliding, moving - sliding, model, loaded))
+        np.multiply(self._errors, sizes, out=effects[:, : 7 * n])
+        own = modelled[:, None] * self._differs - np.diag(self._from_motors.T.dot(residual))
+        effects[:, 7 * n : 8 * n] = self._to_joints.dot(own)
+        effects[:, 8 * n : 10 * n] = -self._through * (self._dynamic * slope)
+        effects[:, 10 * n] = self._to_joints.dot(signals[-n:])
+        effects[:, 10 * n + 1 :] = self._links.of(motion)
+        residual = residual - given.payload[0] * effects[:, -1]
+        at_rest, shape = self._sds
+        variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved
         lasting = self._through * np.sqrt(variance)
         less = self._times[0] / time  # a faster filter averages less of what is noise
         variance[:n] += less * (given.motor_torque_sd**2 + np.square(given.motor_torque_fraction * modelled))
         momentum = inertia.dot(self._from_motors * (np.array(velocity_sd) / time))
         rest = (self._through * variance).dot(self._through.T) + momentum.dot(momentum.T)
-        return Observation(residual, effects, rest, less * moving[:n], pose, lasting)
+        return Observation(residual, effects, rest, less * moving[:n], motion.pose, lasting)

@@ -76,6 +76,7 @@ class ModelErrors:
     drift : sd of the errors' random walk per largest sd, 1/sqrt(s).
     through : (n, n), joint torques per motor torque.
     noise : (n,), N^2 m^2, variance of the motors' torque that is assumed at the start.
+    least_noise : N^2 m^2, a variance that is as good as none.
 
     Attributes
     ----------
@@ -84,8 +85,9 @@ class ModelErrors:
     beyond : names of the errors that are certainly larger than tolerable, the largest first.
     """
 
-    def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
+    def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array, least_noise: float) -> None:
         self._prior = prior
+        self._least_noise = least_noise
         self._walk = drift**2 * np.diag(prior.limit)
         self._through, self._to_motors = through, np.linalg.inv(through)
         # arrays are replaced, never changed: others may keep them
@@ -198,9 +200,11 @@ class ModelErrors:
         self.size = min(max(self.size + rate * (CONTACT.margin * squared - self.size), 1.0), CONTACT.largest_size)
         rate = span / CONTACT.noise_time
         at_motors = self._to_motors @ innovation
-        known = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors) - self.noise * seen.moving
-        # what is below the rest counts, too: of positive parts alone the mean is above 0 without any noise
-        self.noise = np.maximum(0.0, self.noise + rate * seen.moving * (at_motors * at_motors - known - self.noise))
+        stated = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors)
+        # by Fisher's scoring: what is uncertain for another reason, as the friction of a slow shaft, shows no noise
+        share = np.minimum(1.0, (self.noise + self._least_noise) / stated)
+        excess = at_motors * at_motors - stated
+        self.noise = np.maximum(0.0, self.noise + rate * seen.moving * share * share * excess)
         rest = covariance - seen.effects @ (self.covariance @ seen.effects.T)
         self._take(innovation, covariance + (CONTACT.correlated - 1.0) * rest, seen)
 

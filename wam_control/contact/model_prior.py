@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.shaft_friction import DISTANCE_VARIANCE
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
@@ -17,7 +18,7 @@ WAYS = ("positive", "negative")
 
 
 class ModelPrior(NamedTuple):
-    """Errors: friction in positive, then in negative motion; masses; load; constants; centres; delay; payload.
+    """Errors: friction in positive, then in negative motion; masses; load; constants; and others.
 
     Friction and its share of the load are those of motors, then joints.
 
@@ -78,26 +79,32 @@ def model_prior(
             CONTACT.tolerable_torque,
         ),
         (
+            [f"presliding distance of {name}" for name in shafts],
+            math.sqrt(DISTANCE_VARIANCE),
+            math.inf,
+        ),
+        (["delay of the torques"], given.torque_delay_uncertainty, CONTACT.tolerable_delay),
+        (
             [f"centre of mass of {name} along {axis}" for name in arm.links.names for axis in "xyz"],
             given.centre_uncertainty,
             CONTACT.tolerable_centre,
         ),
-        (["delay of the torques"], given.torque_delay_uncertainty, CONTACT.tolerable_delay),
         (["payload"], payload_sd, CONTACT.tolerable_payload + given.payload[1] - given.payload[0]),
     ]
     if use_joint_sensors:
-        kinds = [kinds[1], kinds[4], kinds[6]]
+        kinds = [kinds[1], *kinds[6:]]
     names = tuple(name for each, _, _ in kinds for name in each)
     sds, tolerable = (
         np.concatenate([np.broadcast_to(kind[which], len(kind[0])) for kind in kinds]) for which in (1, 2)
     )
-    errors, covariance = np.zeros(len(names)), np.diag(np.square(sds))
+    errors, covariance, limit = np.zeros(len(names)), np.diag(np.square(sds)), np.square(sds)
     if not use_joint_sensors:
         both = np.arange(2 * n)
         covariance[both, 2 * n + both] = covariance[2 * n + both, both] = given.moving_uncertainty**2
         if model is not None and model.is_identified:
             _identify(arm, model, errors, covariance)
-    return ModelPrior(names, errors, covariance, np.square(sds), tolerable)
+            limit[4 * n :] = covariance.diagonal()[4 * n :]  # friction alone changes after the identification
+    return ModelPrior(names, errors, covariance, limit, tolerable)
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
@@ -128,7 +135,7 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
         add(5 * n + j, f"motors.load_negative.{motor}", 0.5)
         add(6 * n + j, f"joints.load.{joint}", 1.0)
     if all(f"links.torque.{joint}" in known for joint in joints):  # with the torques, the centres are identified
-        covariance[8 * n : 11 * n] = 0.0
+        covariance[10 * n + 1 : -1] = 0.0
     errors[5 * n : 6 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
     errors[6 * n : 7 * n] = model.joints.load
     rows = np.flatnonzero(mixing.any(axis=1))

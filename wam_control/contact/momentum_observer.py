@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
-from wam_control.contact.error_effects import CentreEffects, ErrorEffects, GaugeEffects
+from wam_control.contact.error_effects import ErrorEffects, FilteredMotion, GaugeEffects, LinkEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
 from wam_control.contact.motor_side import JointSample, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.shaft_friction import LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
-from wam_control.contact.tool_load import ToolLoad
 from wam_description.arm import Arm
 from wam_description.event import Code, Event, warning
 from wam_description.model import ArmModel
@@ -91,17 +91,19 @@ class MomentumObserver:
         payload_sd = (high - low) / math.sqrt(3.0)
         if not high and not use_joint_sensors:
             payload_sd = parameters.payload_uncertainty
-        self._load = ToolLoad(arm, times) if payload_sd > 0.0 or high > 0.0 else None
-        centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
+        self._may_carry = payload_sd > 0.0 or high > 0.0
+        links = LinkEffects(arm, self._body, np.multiply(arm.links.mass, parameters.mass_scale))
         self._effects: GaugeEffects | ErrorEffects = (
-            GaugeEffects(n, parameters, centres)
+            GaugeEffects(n, parameters, links)
             if use_joint_sensors
-            else ErrorEffects(side, parameters, times, cycle > 0, centres)
+            else ErrorEffects(side, parameters, times, cycle > 0, links)
         )
         prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
-        noise = (parameters.motor_noise * np.array(side.motors.dynamic)) ** 2
-        self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
-        self._filters = _Filters(n, (3 if use_joint_sensors else 14) * n, times, cycle)
+        noise = (parameters.motor_noise * side.friction.dynamic[:n]) ** 2
+        self._errors = ModelErrors(
+            prior, parameters.drift, side.map.motor_from_joint.T, noise, parameters.motor_torque_sd**2
+        )
+        self._filters = _Filters(n, (5 if use_joint_sensors else 14 + 2 * len(LOG_DISTANCES)) * n, times, cycle)
         self.seen = self._begin()
 
     def reset(self) -> None:
@@ -112,9 +114,7 @@ class MomentumObserver:
         """Forget all samples; the moment before them."""
         n = self._n
         self._filters = self._filters.empty_copy()
-        self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [], [], math.inf)
-        if self._load is not None:
-            self._load.reset()
+        self._last = _Sample([0.0] * n, [0.0] * n, [], np.zeros((n, n)), [], [])
         self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
@@ -150,7 +150,7 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(JointSample(position, velocity, effort, [], [], dt))
+            return self._update(JointSample(position, velocity, effort, [], np.zeros(0), dt))
         if self._side.carries_nothing(state):
             self.reset()
             return True
@@ -168,20 +168,18 @@ class MomentumObserver:
         span = dt + self._gap
         is_first = not self._filters.count
         if is_first:
-            external, model = [0.0] * self._n, [-torque for torque in bias]
+            external, model, qdd = [0.0] * self._n, [-torque for torque in bias], [0.0] * self._n
         else:
             # map and a plain zip: strict=True takes as long as the work on four numbers
             rates = [change / span for change in map(sub, momentum, last.momentum)]
             model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
             left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
-            external = list(map(sub, left, tau))
+            external, qdd = list(map(sub, left, tau)), [change / span for change in map(sub, qd, last.qd)]
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        self._filters.take([*external, *model, *q, *signals], span)
-        if self._load is not None:
-            self._load.observe(q, qd, span)
-        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, max(map(abs, qd))), 0.0
+        self._filters.take(np.concatenate(([*external, *model, *q, *qd, *qdd], signals)), span)
+        self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
@@ -228,7 +226,7 @@ class MomentumObserver:
     @property
     def load_torques(self) -> Array | None:
         """External torques of a mass of 1 kg at the tool, (n,), N m, through the filter; None where not followed."""
-        return None if self._load is None else self._load.torques()[0]
+        return self.seen.effects[:, -1] if self._may_carry else None
 
     @property
     def model_errors(self) -> dict[str, TrackedError]:
@@ -243,9 +241,8 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        load = None if self._load is None else self._load.torques()[which]
-        means, velocity_sd = self._filters.means(which), self._side.velocity_sd
-        return self._effects.observation(means, load, self._last.inertia, velocity_sd, which)
+        motion, velocity_sd = self._filters.motion(which), self._side.velocity_sd
+        return self._effects.observation(motion, self._last.inertia, velocity_sd, which)
 
     def zero(self) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
@@ -260,7 +257,7 @@ class MomentumObserver:
             )
         if not self.is_ready:
             return "too few samples so far; try again"
-        if self._last.speed > CONTACT.at_rest:
+        if max(map(abs, self._last.qd)) > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
         self._errors.zero(self.seen)
@@ -272,27 +269,25 @@ class _Sample(NamedTuple):
 
     Attributes
     ----------
-    q : joint angles, (n,), rad.
+    q, qd : of the joints, (n,), rad, rad/s.
     momentum : (n,), N m s; before the first sample it is empty, as what follows but the inertia.
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
-    speed : of the fastest joint, rad/s.
     """
 
     q: list[float]
+    qd: list[float]
     momentum: list[float]
     inertia: Array
     known: list[float]
     bias: list[float]
-    speed: float
 
 
 class _Filters:
     """First-order filters of what a sample shows, and its mean over a cycle of a dither.
 
-    Each number is filtered with every time constant: the residual and the torque of the model, (2 n,), N m, the pose,
-    (n,), rad; on the motor side also the signals of the shafts, (11 n,).
+    Each number is filtered with every time constant, in the order of `FilteredMotion`.
 
     Parameters
     ----------
@@ -318,9 +313,9 @@ class _Filters:
         """The same without samples."""
         return _Filters(self._n, self._values.shape[1], self.times, self.cycle)
 
-    def take(self, values: list[float], span: float) -> None:
+    def take(self, present: Array, span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
-        present, before, n = np.array(values), self._values, self._n
+        before, n = self._values, self._n
         if not self.count:
             self._values = present + np.zeros_like(before)
         else:
@@ -330,13 +325,14 @@ class _Filters:
                 self._takes = 1.0 - self._keeps
             self._values = self._keeps * before + self._takes * present
             if span > self.times[0]:  # continue from here
-                self._values[:, : 3 * n] = before[:, : 3 * n]
+                self._values[:, : 5 * n] = before[:, : 5 * n]
         if self.cycle:
             self._ring[self.count % self.cycle] = self._values[0]
         self.count += 1
 
-    def means(self, which: int) -> tuple[Array, Array, Array, Array]:
-        """Residual and torque of the model, N m, pose, rad, each (n,), and signals of one time constant."""
+    def motion(self, which: int) -> FilteredMotion:
+        """What was filtered with one time constant; the torque of the model without the mean over a cycle."""
         n, filtered = self._n, self._values[which]
         mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
-        return mean[:n], filtered[n : 2 * n], mean[2 * n : 3 * n], mean[3 * n :]
+        residual, _, pose, velocity, acceleration = mean[: 5 * n].reshape(5, n)
+        return FilteredMotion(residual, filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])

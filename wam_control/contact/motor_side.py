@@ -1,14 +1,13 @@
 """Samples of the motors as those of the joints, with the nominal friction on the way and how certain it is."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
-from wam_control.contact.shaft_friction import ShaftFriction
+from wam_control.contact.shaft_friction import EQUAL, ShaftFriction
 from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
@@ -28,7 +27,7 @@ class JointSample(NamedTuple):
     qd: list[float]
     tau: list[float]
     friction: list[float]
-    signals: list[float]
+    signals: Array
     dt: float
 
 
@@ -45,7 +44,8 @@ class MotorSide:
     Attributes
     ----------
     map : between motors and joints.
-    motors, joints : their friction.
+    is_identified : whether the model is that of a recording.
+    friction : of motors, then joints.
     inertia : (n, n), of rotors and pulleys at the joints, kg m^2.
     """
 
@@ -53,24 +53,16 @@ class MotorSide:
         self.map = TransmissionMap.of(arm)
         self._squared = np.square(self.map.joint_from_motor)
         self.inertia: Array = self.map.at_joints(arm.motors.inertia) + np.diag(arm.joints.armature)
-        is_identified = model is not None and model.is_identified
-        at_motors, at_joints = (model.motors, model.joints) if model else (None, None)
-        self.motors, self.joints = (
-            ShaftFriction(shafts, parameters, rest, at.stribeck_velocity if at else (), is_identified)
-            for shafts, rest, at in (
-                (arm.motors, parameters.motor_rest_velocity, at_motors),
-                (arm.joints, parameters.joint_rest_velocity, at_joints),
-            )
-        )
+        self.is_identified = model is not None and model.is_identified
+        self.friction = ShaftFriction(arm, parameters, model)
         self._velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
         self._parameters, self._has_dither = parameters, has_dither
-        self._torque: Sequence[float] = ()
+        self._torque: Array | None = None
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._torque = ()
-        self.motors.reset()
-        self.joints.reset()
+        self._torque = None
+        self.friction.reset()
         self._velocity.reset()
 
     @property
@@ -80,9 +72,8 @@ class MotorSide:
 
     def expect(self) -> None:
         """Let the friction know how certain the velocities are."""
-        sd = self._velocity.sd
-        self.motors.expect(sd)
-        self.joints.expect(np.sqrt(self._squared.dot(np.square(sd))).tolist())
+        sd = np.array(self._velocity.sd)
+        self.friction.expect(np.concatenate((sd, np.sqrt(self._squared.dot(sd * sd)))))
 
     def carries_nothing(self, state: State) -> bool:
         """Whether brakes or stiction hold the motors, which are at rest without current."""
@@ -98,22 +89,23 @@ class MotorSide:
         q, qd = self.map.joint_positions(theta), self.map.joint_velocities(thetad)
         # with dither a shaft stops at both ends of each swing, held there by the external torque
         keep = 0.0 if self._has_dither else math.exp(-dt / self._parameters.friction_memory)
-        motor, joint = self.motors.of(thetad, keep, dt), self.joints.of(qd, keep, dt)
-        through = self.map.joint_torques(motor.friction)
-        friction = [a + b for a, b in zip(through, joint.friction, strict=True)]
-        sliding = motor.sliding + joint.sliding
+        motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)
+        at_shafts: list[float] = motion.friction.tolist()
+        through = self.map.joint_torques(at_shafts[:n])
+        friction = [a + b for a, b in zip(through, at_shafts[n:], strict=True)]
         tau = self.map.joint_torques(tau_motor)
-        transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*motor.friction, *through], strict=True)]
-        loaded = [abs(torque) * share for torque, share in zip(transmitted, sliding, strict=True)]
-        signals = [
-            *sliding,
-            *map(abs, sliding),
-            *motor.resting,
-            *joint.resting,
-            *motor.shape,
-            *joint.shape,
-            *loaded,
-            *((torque - before) / dt for torque, before in zip(tau_motor, self._torque or tau_motor, strict=True)),
-        ]
-        self._torque = tau_motor
+        transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*at_shafts[:n], *through], strict=True)]
+        sliding, torque = motion.sliding.dot(EQUAL), np.array(tau_motor)
+        change = torque - (torque if self._torque is None else self._torque)
+        signals = np.concatenate(
+            (
+                motion.sliding.ravel(),
+                np.abs(sliding),
+                motion.resting,
+                motion.slow,
+                np.abs(transmitted) * sliding,
+                change / dt,
+            )
+        )
+        self._torque = torque
         return JointSample(q, qd, tau, friction, signals, dt)

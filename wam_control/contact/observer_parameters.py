@@ -38,7 +38,7 @@ class ObserverParameters:
         high=0.1,
     )
     shape_uncertainty: float = parameter(
-        "sd of the friction of a shaft that has just reversed or is slow, per static friction",
+        "sd of the friction of a slow shaft, per static friction",
         high=10.0,
     )
     payload_uncertainty: float = parameter("sd of the mass at the tool where no payload is declared", "kg", high=50.0)

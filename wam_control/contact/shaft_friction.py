@@ -1,14 +1,27 @@
 """Nominal friction of shafts as a function of their motion, and where it is uncertain."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.thresholds import CONTACT
-from wam_description.parts import Joints, Motors
+from wam_description.arm import Arm
+from wam_description.model import ArmModel
 
-LONGEST = 6.0 * CONTACT.steep_angle
+Array = NDArray[np.float64]
+
+# one of each equal part of a distribution that is uniform in the logarithm; shortest first
+LOG_DISTANCES = np.log(CONTACT.shortest_presliding) + math.log(
+    CONTACT.longest_presliding / CONTACT.shortest_presliding
+) * ((np.arange(CONTACT.presliding_count) + 0.5) / CONTACT.presliding_count)
+EQUAL = np.full(len(LOG_DISTANCES), 1.0 / len(LOG_DISTANCES))  # weights of a mean
+# change of a mean over presliding distances per change of ln d, and the variance of ln d
+_APART = LOG_DISTANCES - LOG_DISTANCES.mean()
+DISTANCE_VARIANCE = float(np.square(_APART).mean())
+DISTANCE_WEIGHTS = _APART / np.square(_APART).sum()
 
 
 class ShaftMotion(NamedTuple):
@@ -17,96 +30,82 @@ class ShaftMotion(NamedTuple):
     Attributes
     ----------
     friction : (n,), N m, against the motion.
-    sliding : (n,), signed fraction of Coulomb friction that acts.
-    resting : (n,), how far each shaft is at rest, 0..1.
-    shape : (n,), fraction of `shape_uncertainty` that counts: slow, or just reversed.
+    sliding : (n, k), signed fraction of Coulomb friction that acts, for each presliding distance.
+    resting : (n,), how far the friction of each shaft is that of one long at rest, 0..1.
+    slow : (n,), fraction of `shape_uncertainty` that counts.
     """
 
-    friction: list[float]
-    sliding: list[float]
-    resting: list[float]
-    shape: list[float]
+    friction: Array
+    sliding: Array
+    resting: Array
+    slow: Array
 
 
 class ShaftFriction:
-    """Friction of shafts by their velocities.
+    """Friction of the motors, then of the joints, by their motion.
 
-    f = k (F (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which decays:
-    the friction on a shaft that has just stopped still acts as it did, that on a shaft long at rest is unknown.  k is
-    the friction scale.  F = F_d + (F_s - F_d) exp(-(v / v_s)^2) of an identified arm; of others F_d, as friction that
-    rises at rest alone is as usual, and the difference is uncertain up to some v_s.
+    f = k (F s + b v).  The fraction s follows a motion dx as s' = sgn(dx) + (s - sgn(dx)) exp(-|dx| / d) (Dahl 1968):
+    after a reversal, and after a stop, friction builds up over a presliding distance d.  How long that is nobody knows:
+    s is computed for several distances, which are equally likely.  At rest s is forgotten.  k is the friction scale.
+    F = F_d + (F_s - F_d) exp(-(v / v_s)^2) of an identified arm; of others F_d, as friction that rises at rest alone is
+    as usual, and the difference is uncertain up to some v_s.
 
     Parameters
     ----------
-    shafts : with their friction as modelled.
+    arm : with its friction as modelled.
     parameters : the uncertainty of the model.
-    rest_velocity : rad/s, above which Coulomb friction is full.
-    stribeck : (n,), Stribeck velocity v_s of each, rad/s; empty where it is not known.
-    is_identified : whether the friction towards zero speed was identified.
+    model : with the Stribeck velocities v_s; None where they are not known.
 
     Attributes
     ----------
     dynamic, static : (n,), N m, nominal F_d and F_s.
     """
 
-    def __init__(
-        self,
-        shafts: Motors | Joints,
-        parameters: ObserverParameters,
-        rest_velocity: float,
-        stribeck: Sequence[float] = (),
-        is_identified: bool = False,
-    ) -> None:
-        scale = parameters.friction_scale
-        self.dynamic = [scale * f for f in shafts.dynamic_friction]
-        self.static = [scale * f for f in shafts.static_friction]
-        self._viscous = [scale * b for b in shafts.viscous_friction]
-        self._rest_velocity = rest_velocity
-        self._stribeck = stribeck or [CONTACT.usual_stribeck * rest_velocity] * len(self.dynamic)
-        self._slow = CONTACT.slow if is_identified else CONTACT.slow * CONTACT.assumed_stribeck
-        self._rise = [is_identified * (s - d) for s, d in zip(self.static, self.dynamic, strict=True)]
-        self._rest = [rest_velocity] * len(self.dynamic)
+    def __init__(self, arm: Arm, parameters: ObserverParameters, model: ArmModel | None) -> None:
+        scale, motors, joints = parameters.friction_scale, arm.motors, arm.joints
+        count = len(motors.names)
+        self.dynamic = scale * np.array([*motors.dynamic_friction, *joints.dynamic_friction])
+        self.static = scale * np.array([*motors.static_friction, *joints.static_friction])
+        self._viscous = scale * np.array([*motors.viscous_friction, *joints.viscous_friction])
+        self._rest_velocity = np.repeat((parameters.motor_rest_velocity, parameters.joint_rest_velocity), count)
+        self._stribeck = CONTACT.usual_stribeck * self._rest_velocity
+        if model is not None:
+            self._stribeck = np.array([*model.motors.stribeck_velocity, *model.joints.stribeck_velocity])
+        is_identified = model is not None and model.is_identified
+        self._slow = self._stribeck * CONTACT.slow * (1.0 if is_identified else CONTACT.assumed_stribeck)
+        self._rise = is_identified * (self.static - self.dynamic)
+        self._per_distance = np.outer(1.0 / self._rest_velocity, np.exp(-LOG_DISTANCES))
+        self._rest = self._rest_velocity
         self.reset()
 
     def reset(self) -> None:
         """Forget the motion."""
-        self._held = [0.0] * len(self.dynamic)
-        self._travel = [0.0] * len(self.dynamic)
+        self._sliding = np.zeros_like(self._per_distance)
+        self._resting = np.ones_like(self._per_distance)
 
-    def expect(self, velocity_sd: Sequence[float]) -> None:
+    def expect(self, velocity_sd: Array) -> None:
         """Take the standard deviations of the velocities, (n,), rad/s: a shaft slower than them may be at rest."""
-        self._rest = [max(self._rest_velocity, CONTACT.rest_noise * sd) for sd in velocity_sd]
+        self._rest = np.maximum(self._rest_velocity, CONTACT.rest_noise * velocity_sd)
 
-    def of(self, velocity: Sequence[float], keep: float, dt: float) -> ShaftMotion:
+    def of(self, velocity: Array, keep: float, dt: float) -> ShaftMotion:
         """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
 
-        `keep` is the decay of the memory in it, 0 for none: with a dither.
+        `keep` is the decay of the memory of a shaft at rest in it, 0 for none: with a dither.
         """
-        friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
-        slowest = self._rest_velocity
-        for i, v in enumerate(velocity):
-            share = v / self._rest[i]
-            if share >= 1.0 or share <= -1.0:
-                held[i] = share = 1.0 if share > 0.0 else -1.0
-                # counted in the direction of the motion
-                travel[i] = travel[i] + v * dt if travel[i] * v >= 0.0 else v * dt
-            else:
-                held[i] *= keep
-            fraction, level, turned = abs(share), self.dynamic[i], abs(v) / self._stribeck[i]
-            if self._rise[i] and turned < LONGEST:
-                level += self._rise[i] * math.exp(-turned * turned)
-            friction.append(level * (share + (1.0 - fraction) * held[i]) + self._viscous[i] * v)
-            sliding.append(share)
-            resting.append(1.0 - share * share)
-            slow, since = turned / self._slow, abs(travel[i]) / slowest
-            if travel[i] * v < 0.0 < keep:
-                since = 0.0  # it turns back; a dither ends each of its swings in that way
-            uncertain = math.exp(-slow) if slow < LONGEST else 0.0
-            if since < LONGEST:
-                uncertain = max(
-                    uncertain,
-                    CONTACT.steep_shape * math.exp(-since / CONTACT.steep_angle)
-                    + CONTACT.shallow_shape * math.exp(-since / CONTACT.shallow_angle),
-                )
-            shape.append(fraction * uncertain)
-        return ShaftMotion(friction, sliding, resting, shape)
+        speed = np.abs(velocity)
+        moving = np.minimum(1.0, speed / self._rest)
+        remembered = (1.0 - (1.0 - keep) * (1.0 - moving))[:, None]
+        left = np.exp((-dt * speed)[:, None] * self._per_distance)
+        way = np.sign(velocity)[:, None]
+        if not keep:  # a dither swings a shaft beyond any presliding
+            left, way = np.zeros_like(left), moving[:, None] * way
+        self._sliding = way + (remembered * self._sliding - way) * left
+        self._resting = np.maximum(left * self._resting, (1.0 - moving * moving)[:, None])
+        turned = velocity / self._stribeck
+        level = self.dynamic + self._rise * np.exp(-turned * turned)
+        return ShaftMotion(
+            level * self._sliding.dot(EQUAL) + self._viscous * velocity,
+            self._sliding,
+            np.sqrt((self._resting * self._resting).dot(EQUAL)),
+            moving * np.exp(-speed / self._slow),
+        )

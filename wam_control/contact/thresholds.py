@@ -15,8 +15,6 @@ class ContactThresholds:
     alone: float = 2.0
     smallest_statistic: float = 1e-12  # of the statistic of the torques, for a division
     settled: float = 2.0  # time constants of the observer, from the first sample until the estimate is ready
-    load_span: float = 0.5  # time constants, in which the torque of a payload is that of its mean motion
-    smallest_mass: float = 1e-6  # kg, the smallest mass that a link may have
     # position, force and link of one contact
     smallest_force: float = 1e-6  # N, avoids a division by zero where there is no force
     search_depth: float = 8.0  # of the log of probability; positions further below the maximum are neglected
@@ -84,10 +82,11 @@ class ContactThresholds:
     slow: float = 1.2  # Stribeck velocities: speed over which what the law of friction leaves out decays
     assumed_stribeck: float = 3.0  # by which a Stribeck velocity that was not identified may be too small
     usual_stribeck: float = 10.0  # rest velocities: Stribeck velocity of a shaft of which no model is known
-    steep_shape: float = 2.0  # of `shape_uncertainty`, just after a reversal (presliding): the part that decays slowly
-    steep_angle: float = 0.6  # its angle after the reversal, in seconds at the rest velocity
-    shallow_shape: float = 3.2  # the same: the part that decays fast
-    shallow_angle: float = 0.2  # its angle, in seconds at the rest velocity
+    # the angle over which friction builds up after a reversal, in seconds at the rest velocity: from that of a rigid
+    # bearing to that of a soft seal
+    shortest_presliding: float = 0.04
+    longest_presliding: float = 4.0
+    presliding_count: int = 4  # angles that stand for all between
     rest_noise: float = 3.0  # sd of the measured velocity that the rest velocity is at least
     # of the cycle of a dither, in which a shaft that slips in both directions has surely been at both its limits
     slips_both_ways: float = 0.25
