@@ -132,14 +132,13 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
 
 
 def test_errors_of_a_shaft_whose_friction_is_uncertain_show_no_noise_of_its_motor() -> None:
-    """Twice what is stated at every second sample; as noise they would hide contacts in all of the motion."""
     tracked, random = errors(noise=0.005), np.random.default_rng(3)
     for k in range(2000):
         stated, times = (0.5, 2.0) if k % 2 else (0.05, 1.0)
         residual, pose = times * stated * random.standard_normal(2), random.uniform(-1.0, 1.0, 2)
         moment = Observation(residual, np.zeros((2, 3)), stated**2 * np.eye(2), np.ones(2), pose, STAYS)
         tracked.follow(moment, QUIET, False, CONTACT.learn_interval)
-    assert np.all(np.sqrt(tracked.noise) < 0.05 / np.array([30.0, 20.0]))
+    assert np.all(np.sqrt(tracked.noise) < 0.05 / np.array([30.0, 20.0])), "as noise it would hide contacts in motion"
 
 
 @pytest.mark.slow
