@@ -23,6 +23,8 @@ class ShaftThresholds:
     passing: float = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
     still: float = 0.01  # of the speed of rest: below it the shaft has not begun to move
     # friction
+    # of the way in one direction: less in the other is a deflection, as by a push, and shows no friction
+    both_ways: float = 0.05
     fewest_samples: int = 20  # below which a signal is not evaluated
     agreeing: int = 3  # breakaways of which the least is taken for the highest: no single one decides
     precise: float = 0.01  # of the torque: noise at a breakaway after the line

@@ -141,8 +141,9 @@ def _in_motion(
     reach = np.ones(len(triangle))
     onward = np.convolve((allowed & (velocity > rest)).astype(float), reach, "same") > len(reach) - 0.5
     back = np.convolve((allowed & (velocity < -rest)).astype(float), reach, "same") > len(reach) - 0.5
+    ways = [float(np.sum(np.abs(velocity[each]))) for each in (onward, back)]
     rows = np.flatnonzero(onward | back)
-    if len(rows) < SHAFT.fewest_samples:
+    if len(rows) < SHAFT.fewest_samples or 0.0 < min(ways) < SHAFT.both_ways * max(ways):
         return nothing
     v = np.convolve(velocity, triangle, "same")[rows]
     acceleration = np.convolve(velocity, slope, "same")[rows] / period
