@@ -28,17 +28,26 @@ REASONS: Final = {
     Reason.BRAKED: "brakes hold the motors",
 }
 
-PINNED: Final = "give the contact position (by the torque of the command, or with contact_source pinned)"
+PINNED: Final = (
+    "give the contact position (contact_position in a scenario, the torque of a force command, or contact_source "
+    "pinned)"
+)
 RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly"
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
-    "torques": ("the measured torques", "use joint sensors, tare in free space, or command more force"),
+    "torques": (
+        "the measured torques",
+        "use joint sensors or the dither (timing.dither_cycle), or tare in free space",
+    ),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),
     "pinned_place": (
         "the contact position",
         "bend the arm, or lower contact_position_sd if the position is known better",
     ),
-    "resting": ("the load of the arm", "declare the load (arm.payload), or end the command and tare in free space"),
+    "resting": (
+        "a load that is not in the model",
+        "end the command and tare in free space ('wam call tare'), or declare the load of a real arm (arm.payload)",
+    ),
     "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
     "slow_arm": ("the slow approach to this force", "declare guard.contact_stiffness, or raise limits.settling_time"),
     "shaking_arm": ("the vibration of the arm", "use joint sensors, or declare guard.contact_stiffness"),
@@ -58,7 +67,7 @@ SENTENCES: Final = {  # by cause
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
     "(limits.free_travel): end the command, then begin again",
     # the arm goes on
-    "uncertain": UNCERTAIN + ": {part_help}",
+    "uncertain": UNCERTAIN + "; the arm presses on: {part_help}",
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
     "measured: command a force that the arm can reach, or bend the arm",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
@@ -69,7 +78,8 @@ SENTENCES: Final = {  # by cause
     "this direction here",
     "speed": RAISE,
     "torques_differ": "the torques are not those of a force at {position:.3g} m of {cover} (chi^2 {chi2:.3g}, allowed: "
-    "{allowed:g}): it acts elsewhere, or a second force acts; correct the contact position, or free the arm",
+    "{allowed:g}): it acts elsewhere, a second force acts, or friction of motors at rest hides a part of it; correct "
+    "the contact position, use the dither, or free the arm",
     "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}): a "
     "second force acts, or the friction of the surface has changed its direction; command the force again",
     "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N (limits.contact_force or "

@@ -139,8 +139,7 @@ class Resting:
         if self._is_decided or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
             return
         self._is_decided = True
-        sd = math.hypot(torque_sd, FORCE.payload_rest * float(np.abs(self.torques).max()))
-        mass, left = measurement.payload(q, self.torques, sd)
+        mass, left = measurement.payload(q, self.torques, torque_sd)
         if mass > 0.0 and left <= FORCE.unexplained:
             return
         if axis.sensed is None or axis.place is None:

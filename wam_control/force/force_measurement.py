@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +35,30 @@ class LowPass:
         return self.value
 
 
+class Zero(NamedTuple):
+    """What counts as zero: the weight of a mass at the tool, kg, which holds in every pose, and torques (n,), N m."""
+
+    mass: float
+    torques: Array
+
+    def at(self, body: RigidBody, q: Sequence[float]) -> Array:
+        """Torques of the world on the joints (n,), N m, in a pose (n,), rad."""
+        return self.torques + self.mass * _weight(body, q) if self.mass else self.torques
+
+
+def _weight(body: RigidBody, q: Sequence[float]) -> Array:
+    """Torques of the world on the joints (n,), N m, by a mass of 1 kg at the tool."""
+    weight: Array = np.array(body.arm.gravity) @ body.tool_jacobian(q)
+    return weight
+
+
 class ForceMeasurement:
     """External torques of the joints, less the tare and the zero of the present command.
 
     Attributes
     ----------
     torques : of the world on the joints, filtered.
+    free : torques of the world on the joints (n,), N m, that counted as those of a free arm when they were taken.
     rested : time for which the arm has been at rest, s.
     speed : mean speed of the fastest joint, rad/s; infinite where it is not known yet.
     """
@@ -47,7 +66,10 @@ class ForceMeasurement:
     def __init__(self, body: RigidBody) -> None:
         self._body = body
         self._none = np.zeros(len(body.arm.joints.names))
-        self._tare = self._zero = self._external = self._none
+        self._tare = self._zero = Zero(0.0, self._none)
+        self.free = self._external = self._none
+        self._q: Sequence[float] = ()
+        self._torque_sd = self._none
         self._velocity: Array | None = None
         self._filters = {"torque": LowPass(), "steady": LowPass(), "acceleration": LowPass(), "speed": LowPass()}
         self.rested, self.speed = 0.0, math.inf
@@ -81,16 +103,17 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(own, sensors, estimated)
+        self._q, self._torque_sd = joints.position, self._none + sensing_of(own).torque_sd
         speed = np.abs(self._filters["speed"].step(np.array(joints.velocity), FORCE.steady_time, dt)).max()
         self.speed = float(speed)
         self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
         self._filters["steady"].step(torque, FORCE.steady_time, dt)
-        self._external = torque - self._tare - self._zero
+        self._external = torque - self._zeros
         counted = self._external if is_touched or not own.is_estimated else self._none
         before = self._filters["torque"].value
         lag = 0.0 if own.mode == "joint_torque" else own.force_filter
         now = self._filters["torque"].step(counted, lag, dt)
-        sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._none + sensing_of(own).torque_sd
+        sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._torque_sd
         self.torques = WorldTorques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
 
     def _acceleration(self, own: ForceLoopParameters, sensors: State | None, dt: float) -> Array | None:
@@ -109,28 +132,41 @@ class ForceMeasurement:
             return np.array(own.spring_stiffness) * (np.array(own.spring_rest) - np.array(sensors.position))
         return self._body.gravity_torque(sensors.position) - np.array(sensors.effort)
 
+    @property
+    def _zeros(self) -> Array:
+        """Tare and zero in the present pose (n,), N m."""
+        return self._tare.at(self._body, self._q) + self._zero.at(self._body, self._q)
+
+    def _taken(self, torques: Array) -> Zero:
+        """Torques (n,), N m, as zero: of a payload where they are certainly some, and one explains them."""
+        mass, left = self.payload(self._q, torques, float(self._torque_sd.max()))
+        scaled = torques / self._torque_sd
+        if mass > 0.0 and left <= FORCE.unexplained < float(scaled @ scaled):
+            return Zero(mass, torques - mass * _weight(self._body, self._q))
+        return Zero(0.0, torques)
+
     def tare(self) -> None:
         """Take the present external torques as zero."""
-        self._tare = self._tare + self._external
+        self._tare = self._taken(self._tare.at(self._body, self._q) + self._external)
+        self.free = self._zeros
         self.restart()
-
-    @property
-    def free(self) -> Array:
-        """Torques of the world on the joints (n,), N m, that count as those of a free arm: the tare and the zero."""
-        return self._tare + self._zero
 
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         steady = self._filters["steady"].value
-        return self._external if steady is None else steady - self._tare - self._zero
+        return self._external if steady is None else steady - self._zeros
 
     def zero(self, limit: float) -> bool:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
         steady = self._filters["steady"].value
-        if steady is None or float(np.abs(steady - self._tare).max()) > limit:
+        if steady is None:
             return False
-        self._zero = steady - self._tare
+        found = steady - self._tare.at(self._body, self._q)
+        if float(np.abs(found).max()) > limit:
+            return False
+        self._zero = self._taken(found)
+        self.free = self._zeros
         self.restart()
         return True
 
@@ -142,8 +178,8 @@ class ForceMeasurement:
         q : joint angles (n,), rad.
         torques, torque_sd : torques (n,), N m, and the standard deviation of each, N m.
         """
-        weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q) / torque_sd
-        scaled = torques / torque_sd
+        sd = math.hypot(torque_sd, FORCE.payload_rest * float(np.abs(torques).max()))
+        weight, scaled = _weight(self._body, q) / sd, torques / sd
         mass = float(weight @ scaled) / max(float(weight @ weight), FORCE.negligible)
         left = scaled - mass * weight
         return mass, float(left @ left)
