@@ -1,6 +1,6 @@
 """A controller of your own: tip impedance in place of the force loop.
 
-The tip behaves like a mass on a spring and a damper fixed where the commanded posture has it:
+A spring pulls the tip from its place x to x0, where it is in the commanded posture; a damper brakes it:
 tau = J' (K (x0 - x) - D xd).  Run it in three ways, from this directory:
 
     python3 impedance.py                                   # in one process, without ROS
@@ -67,7 +67,10 @@ class Impedance:
         }
 
     def _admitted(self, posture: list[float], q: list[float]) -> list[float]:
-        """The commanded posture, in place of one beyond the stops the last good one; without a command where it is."""
+        """The posture x0 belongs to: the commanded one; if that is beyond the stops, the last one that was not.
+
+        Without a command it is the present posture q.
+        """
         beyond = self._joints.beyond(posture) if posture else ""
         self.refusals = {"joint_posture_command": beyond} if beyond else {}
         self._rest = [] if not posture else self._rest if beyond else posture

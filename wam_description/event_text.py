@@ -20,8 +20,8 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
     Reason.LINKS: "the torques do not identify the link",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the force may act along this link; such a force gives the same torques at each position, and on the "
-    "link before",
+    Reason.ALONG: "the force may be parallel to this link: then the torques show neither its position, nor whether it "
+    "acts on this link or on the one before",
     Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is 1 minus the sum of those "
     "of the links",
     Reason.TOO_EARLY: "too few samples so far",

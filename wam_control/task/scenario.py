@@ -35,7 +35,7 @@ from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; required",
     "seconds": "duration, s of the arm's time; required. With `until_force` the longest duration",
-    "posture": "the angle of each joint at the end of the step, rad; the arm arrives a little later",
+    "posture": "the commanded angle of each joint at the end of the step, rad; the arm gets there a little later",
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force on the world, N, in `base` or in the "
