@@ -10,24 +10,25 @@ from wam_driver.thresholds import DRIVER
 
 
 class WatchedLimit(NamedTuple):
-    """A quantity near its limit, which is a warning, or above it, which is a fault."""
+    """A quantity near its limit, which is a warning, or above it, which is a fault; `where` is '' or text behind it."""
 
     quantity: str
     value: float
     limit: float
     unit: str
+    where: str = ""
 
     @property
     def warning(self) -> str:
         """The warning, in words."""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}"
+        return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}{self.where}"
 
     @property
     def excess(self) -> str:
         """That the quantity is above its limit, which is a fault; '' while it is not."""
         if self.value <= self.limit:
             return ""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}"
+        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}{self.where}"
 
 
 class LimitWatch:
@@ -49,12 +50,13 @@ class LimitWatch:
         starts = self._body.moving
         self._speeds = [*[cover_speed_limit] * len(starts), tip_speed_limit, *joints.speed_limit]
         self._strengths = [circuit.breaking_strength for circuit in arm.circuits]
+        self._travels = {f"travel of {name} from the middle of its range": i for i, name in enumerate(joints.names)}
         self._of_cables = [(f"cable tension of {name}", "N") for name in motors.names]
         self._quantities = [
             *((f"speed of the start of {cover}", "m/s") for cover in starts),
             ("speed of the tip", "m/s"),
             *((f"speed of {name}", "rad/s") for name in joints.names),
-            *((f"travel of {name} from the middle of its range", "rad") for name in joints.names),
+            *((travel, "rad") for travel in self._travels),
             *((f"current of {name}", "A") for name in motors.names),
             *self._of_cables,
         ]
@@ -91,7 +93,15 @@ class LimitWatch:
             *map(abs, currents),
             *tensions,
         ]
-        return _near(self._quantities, values, self._limits)
+        return [self._located(near, q) for near in _near(self._quantities, values, self._limits)]
+
+    def _located(self, near: WatchedLimit, q: Sequence[float]) -> WatchedLimit:
+        """A quantity; if it is a travel, with the angle of the joint and of its stop there."""
+        if (i := self._travels.get(near.quantity)) is None:
+            return near
+        joints = self._arm.joints
+        stop = joints.lower[i] if q[i] < self._middle[i] else joints.upper[i]
+        return near._replace(where=f": {joints.names[i]} is at {q[i]:.4g} rad, its stop at {stop:.4g} rad")
 
     def tensions(self, tensions: Sequence[float]) -> list[WatchedLimit]:
         """The cables whose tension, (n,), N, is near their breaking strength, also while the brakes stop the arm."""

@@ -36,6 +36,7 @@ from wam_sim.simulation import Simulation
 __all__ = ["IdentifiedModel", "analyse", "arm", "guard", "identify", "load", "read", "simulate"]
 
 Named = str | Path | Configuration
+ALWAYS = "always refuse here; a running stack has guard.mode limit and lowers values instead"
 
 
 def load(name: str | Path = "wam", values: Mapping[str, Any] | None = None) -> Configuration:
@@ -109,9 +110,12 @@ def guard(configuration: Named = "wam") -> Report:
     """
     found = _loaded(configuration)
     shared, own = found.shared, found.node("force_loop", ForceLoopParameters)
-    if own.guard.mode == "limit":
+    lowers = own.guard.mode == "limit"
+    if lowers:
         own = replace(own, guard=replace(own.guard, mode="refuse"))
-    return ForceLoop(shared.model_arm, shared.servo, own, shared.timing).report
+    assessed = ForceLoop(shared.model_arm, shared.servo, own, shared.timing).report
+    never_lowers = lowers and assessed.facts["guard"] == "refuse"  # not where nothing is fed back
+    return assessed._replace(facts=assessed.facts | {"guard": ALWAYS}) if never_lowers else assessed
 
 
 class IdentifiedModel(NamedTuple):

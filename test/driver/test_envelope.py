@@ -212,7 +212,7 @@ def test_joint_limits_and_currents_are_watched() -> None:
     at[1] = 0.95 * ARM.joints.lower[1]
     assert list(watched(watch, at)) == [name]
     at[1] = ARM.joints.lower[1] - 0.001
-    assert watched(watch, at)[name].excess
+    assert watched(watch, at)[name].excess.endswith(": joint2 is at -2.357 rad, its stop at -2.356 rad")
     near = watched(watch, ARM.joints.start, [0.0, -0.95 * ARM.motors.peak_torque[1] / 0.25, 0.0, 0.0])
     assert list(near) == ["current of motor2"]
     assert watched(watch, [math.nan] * N)[name].excess
