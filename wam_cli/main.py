@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(0)
     given, rest = parser.parse_known_args(words)
     if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+        given.parser.error(f"unrecognized arguments: {' '.join(rest)}")
     given.ros = rest
     received: list[int] = []
 
@@ -199,6 +199,7 @@ def _parser(command: Any) -> argparse.ArgumentParser:
         own = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.", allow_abbrev=False)
         if command is not None and command.__name__.endswith(f".{name}"):
             command.arguments(own)
+            own.set_defaults(parser=own)
     return parser
 
 

@@ -172,7 +172,7 @@ class Processes(Closing):
         names = node_names(configuration)
         self.killed: list[str] = []
         self.processes = {
-            " or ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
+            ", ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
             for group, place in placed_groups(configuration.shared, processes)
         }
 
@@ -190,7 +190,7 @@ class Processes(Closing):
     @property
     def failures(self) -> list[str]:
         """Nodes that have ended and should not have; why, they have printed themselves."""
-        return [f"node {name} {_ending(code)}" for name, code in self.ended().items() if code]
+        return [f"{process_of(name)} {_ending(code)}" for name, code in self.ended().items() if code]
 
     def close(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
@@ -199,7 +199,7 @@ class Processes(Closing):
         """
         deadline = time.monotonic() + PROCESS_LIMITS.end
         before = self.ended()
-        first = [name for name in self.processes if FIRST in name.split()]
+        first = [name for name in self.processes if FIRST in name.split(", ")]
         others = [name for name in self.processes if name not in (*first, LAST)]
         if any(code < 0 for code in before.values()):
             for process in self.processes.values():
@@ -230,9 +230,14 @@ class Processes(Closing):
                 LOGGER.warning(f"waiting for the recorder to write the bag, {seconds:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
-        LOGGER.error(f"node {name} is killed: it {reason}")
+        LOGGER.error(f"{process_of(name)} is killed: it {reason}")
         self.killed.append(name)
         self.processes[name].kill()
+
+
+def process_of(nodes: str) -> str:
+    """What a message calls a process: its node, or the nodes that share it."""
+    return f"the process of the nodes {nodes}" if "," in nodes else f"node {nodes}"
 
 
 def _ending(code: int) -> str:

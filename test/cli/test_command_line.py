@@ -47,7 +47,7 @@ def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) 
         ("xyzzy", "invalid choice: 'xyzzy' (choose from 'demo', 'up', "),
         ("call enabel", "there is no 'enabel'; did you mean 'enable'?"),
         ("evaluate contct", "there is no 'contct'; did you mean 'contact'?"),
-        ("up --name left", "unrecognized arguments: --name left"),  # no abbreviation of --namespace
+        ("up --name left", "wam up: error: unrecognized arguments: --name left"),  # no abbreviation of --namespace
     ],
 )
 def test_a_word_that_does_not_exist_is_answered_with_the_one_that_was_meant(

@@ -286,7 +286,7 @@ def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: P
     assert (bag / "metadata.yaml").is_file(), "the recorder closed its bag"
 
 
-GROUP = "transform or gravity or force_loop or contact_estimator"
+GROUP = "the process of the nodes transform, gravity, force_loop, contact_estimator"
 
 
 def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(started: Any, tmp_path: Path, domain_id: int) -> None:
@@ -296,7 +296,7 @@ def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(started: Any, 
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     errors = [line for line in stack.said().splitlines() if line.startswith("error: ")]
-    cause = f"error: node {GROUP} was ended from outside by SIGKILL; the system does that if memory is short"
+    cause = f"error: {GROUP} was ended from outside by SIGKILL; the system does that if memory is short"
     assert errors[0] == f"{cause}; all others are stopped now", "the cause comes first"
     assert errors[-1] == f"{cause}; all others were stopped"
     assert stack.process.returncode == 9

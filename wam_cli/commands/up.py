@@ -17,7 +17,7 @@ from wam_cli.options import (
 from wam_control.task.scenario import load_for
 from wam_description.configuration import Configuration
 from wam_description.nodes import EACH, GROUPED, ONE
-from wam_ros.bring_up import start
+from wam_ros.bring_up import process_of, start
 from wam_ros.node import node_factory
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_ros.run import die_with_parent
@@ -79,8 +79,8 @@ def run(given: argparse.Namespace) -> int:
         close_page()
     for node, code in ended.items():
         if not code:
-            print(f"node {node} has ended; all were stopped")
-    if given.scenario and "scenario" in ended and not any(ended.values()):
+            print(f"{process_of(node)} has ended; all were stopped")
+    if given.scenario and "scenario" in ", ".join(ended).split(", ") and not any(ended.values()):
         record = "" if given.record else "play it with --record, then "
         print(f"played; to see whether its commands were carried out: {record}'wam analyse BAG --steps'")
     for failure in failures:
