@@ -378,6 +378,11 @@ class Shared:
         self.arm.links.require_bodies()
         aligned("motion", self.arm.joints.names, self.motion)
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the driver is that of the simulated arm; another one is among the nodes as 'module:Class'."""
+        return "driver" in self.nodes
+
     def push_excess(self, force: Sequence[float], torque: Sequence[float]) -> str:
         """Why a push is not allowed, '' where it is.
 

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any, Final, NamedTuple
 
 from rcl_interfaces.srv import DescribeParameters
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -110,7 +110,7 @@ class StackClient(Closing):
         client, message = self.service(request)
         name = self.node.resolve_service_name(client.srv_name)
         if not self.wait(client.service_is_ready, seconds):
-            there = self._nodes_without(request.node)
+            there = self._nodes_without(request.node) or self._services(request.node)
             advice = f"there are {', '.join(there)}" if there else START
             return Reply(False, f"no service {name} within {seconds:g} s; {advice}")
         attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
@@ -197,6 +197,13 @@ class StackClient(Closing):
         own = self.node.get_namespace()
         found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
         return [] if node in found else sorted(found - {self.node.get_name()})
+
+    def _services(self, node: str) -> list[str]:
+        """The services of a node that are called without values or with a switch, none where it is not there."""
+        with suppress(NodeNameNonExistentError):
+            found = self.node.get_service_names_and_types_by_node(node, self.node.get_namespace())
+            return sorted(name for name, (kind, *_) in found if kind.startswith("std_srvs/"))
+        return []
 
     def live(self, node: str, names: Collection[str]) -> list[str]:
         """Those of the parameters of a node that a request may change while it runs.

@@ -93,7 +93,8 @@ class RequestQueue:
             if not is_reported and time.monotonic() - began > NODE_LIMITS.service_wait:
                 is_reported = True
                 self._node.get_logger().warning(
-                    f"waiting for the service {client.srv_name}; start the node '{request.node}', or request another"
+                    f"waiting for the service {client.srv_name}, which no node offers; start the node '{request.node}' "
+                    "that offers it, or let this node request another service"
                 )
             if client.service_is_ready():  # before, the request would be lost
                 timer.cancel()

@@ -83,7 +83,7 @@ class RecordedRun(NamedTuple):
         """
         topics = {*self.bag.topics, *self.bag.counts}
         try:
-            has_own = "driver" not in self.parameters.shared.nodes
+            has_own = not self.parameters.shared.is_simulated
         except BagError:
             has_own = self.mode != "lockstep"
         return not has_own or any(name.startswith(f"{self.namespace}/sim/") for name in topics)

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
@@ -34,7 +34,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, tunable
 from wam_description.signals import NO_CONTACT, ZERO, Contact, PathPoint, PosturePath, State
 from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Call, Input, Outputs, reaction
 from wam_sim.simulation import Simulation
 
 
@@ -141,16 +141,12 @@ def test_a_contact_that_does_not_come_fails_and_asks_for_the_brakes() -> None:
     assert failed.force == NO_FORCE
 
 
-def test_requests_are_made_once_when_their_step_begins() -> None:
-    scenario = Scenario(
-        [
-            ScenarioStep("on", 0.02, request="enable"),
-            ScenarioStep("wait", 0.02),
-            ScenarioStep("off", 0.02, request="disable"),
-        ]
-    )
-    outs = play(scenario, 14)
+def test_requests_and_settings_are_made_once_when_their_step_begins() -> None:
+    settings = (Setting("driver", "effects.added_coulomb_friction", (0.5,)),)
+    steps = [ScenarioStep("on", 0.02, request="enable"), ScenarioStep("rub", 0.02, settings=settings)]
+    outs = play(Scenario([*steps, ScenarioStep("off", 0.02, request="disable")]), 14)
     assert [(k, out.request) for k, out in enumerate(outs) if out.request] == [(0, "enable"), (8, "disable")]
+    assert [(k, out.settings) for k, out in enumerate(outs) if out.settings] == [(4, settings)]
     assert [out.done for out in outs] == [False] * 12 + [True] * 2
     assert outs[-1].failure == ""
 
@@ -364,19 +360,15 @@ def test_a_scenario_that_commands_an_arm_which_nobody_has_enabled_fails(step: Sc
 
 
 @pytest.mark.slow
-def test_whoever_enables_the_arm_a_scenario_may_command_it() -> None:
+def test_whoever_enables_the_arm_a_scenario_may_command_it_and_push_it_braked() -> None:
+    push = Push("outer_link", 0.3, (0.0, 5.0, 0.0), 0.0, 0.1)
+    assert Simulation(CONFIGURATION, [ScenarioStep("push", 0.1, push=push)]).play() == ""
     steps = [ScenarioStep("go", 0.1, tuple(START)), ScenarioStep("stop", 0.02, request="disable")]
     assert Simulation(CONFIGURATION, [ScenarioStep("on", 0.05, request="enable"), *steps]).play() == ""
     assert Simulation(CONFIGURATION, [steps[0]._replace(request="enable")]).play() == ""
     run = Simulation(CONFIGURATION, steps)
     assert run.driver.enable("").success
     assert run.play() == ""
-
-
-@pytest.mark.slow
-def test_a_braked_arm_may_be_pushed() -> None:
-    push = Push("outer_link", 0.3, (0.0, 5.0, 0.0), 0.0, 0.1)
-    assert Simulation(CONFIGURATION, [ScenarioStep("push", 0.1, push=push)]).play() == ""
 
 
 # chirps and settings
@@ -410,12 +402,6 @@ def test_a_chirp_swings_the_force_along_itself_from_the_first_frequency_to_the_l
     assert 1.0 / np.diff(rises) == pytest.approx(8.0 ** (between / 6.0), rel=0.02)
     assert (between[0], between[-1]) == (pytest.approx(0.5, abs=0.4), pytest.approx(5.9, abs=0.1))
     assert len(rises) == pytest.approx(6.0 * 7.0 / math.log(8.0), abs=1)  # turns of an exponential sweep
-
-
-def test_settings_are_made_once_when_their_step_begins() -> None:
-    settings = (Setting("driver", "effects.added_coulomb_friction", (0.5,)),)
-    scenario = Scenario([ScenarioStep("wait", 0.01), ScenarioStep("rub", 0.02, settings=settings)])
-    assert [out.settings for out in play(scenario, 6)] == [(), (), settings, (), (), ()]
 
 
 def test_a_setting_that_does_not_fit_the_other_values_is_refused_where_these_are_known(tmp_path: Path) -> None:
@@ -495,14 +481,11 @@ def test_a_posture_that_the_force_loop_cannot_follow_is_refused(
     with pytest.raises(ParameterError, match=text):
         load_for(CONFIGURATION, quick(tmp_path, float(least) - 0.01, limit))
     load_for(CONFIGURATION, quick(tmp_path, float(least), limit))
+    with pytest.raises(ParameterError, match=r"force_loop:joint_speed_limit, 0 rad/s; raise it"):
+        load_for(CONFIGURATION, quick(tmp_path, 1.0, 0.0))
     held = [name for name in CONFIGURATION.shared.nodes if name != "force_loop"]
     path = write(tmp_path, {"steps": [{"name": "go", "seconds": 0.35, "posture": GOAL}]})
     load_for(CONFIGURATION.with_values({"nodes": held, "force_loop:joint_speed_limit": 0.1}), str(path))
-
-
-def test_a_posture_is_refused_where_no_joint_may_turn(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"joint4 goes from .* force_loop:joint_speed_limit, 0 rad/s; raise it"):
-        load_for(CONFIGURATION, quick(tmp_path, 1.0, 0.0))
 
 
 @pytest.mark.parametrize("time", ["1.0e-150", "1.0e+150"])
@@ -551,7 +534,7 @@ def test_after_a_trajectory_or_a_line_it_is_known_where_the_next_motion_begins(m
         load_for(CONFIGURATION, str(write(tmp_path, {"steps": steps})))
 
 
-def test_where_the_arm_begins_is_known_only_of_a_simulated_one(tmp_path: Path) -> None:
+def test_only_of_a_simulated_arm_it_is_known_where_it_begins_and_can_the_time_be_stopped(tmp_path: Path) -> None:
     far = [WAM.joints.start[0] + 1.0, *WAM.joints.start[1:]]
     path = write(tmp_path, {"steps": [{"name": "go", "seconds": 0.1, "posture": far}]})
     with pytest.raises(ParameterError, match="'go': joint1 goes from"):
@@ -559,6 +542,12 @@ def test_where_the_arm_begins_is_known_only_of_a_simulated_one(tmp_path: Path) -
     assert len(load(path, SHARED)) == 1, "played into a stack that runs, by an arm that may be there"
     others = [name for name in SHARED.nodes if name != "driver"]
     assert len(load_for(CONFIGURATION.with_values({"nodes": others}), str(path))) == 1
+    for nodes, requests in ((SHARED.nodes, [Call("driver", "pause", True)]), (tuple(others), [])):
+        scenario = Scenario([ScenarioStep("wait", 0.005)])
+        node = ScenarioNode(replace(SHARED, nodes=nodes), ScenarioParameters(""), scenario)
+        for tick in range(3):
+            node.step(Inputs.of(tick + 1, 0.005, {"joint_states": (tick, State(list(START), [], []))}))
+        assert (node.done, node.failure, node.requests) == (True, "", requests)
 
 
 @pytest.mark.slow

@@ -521,7 +521,7 @@ def test_a_request_to_a_node_that_does_not_exist_says_what_it_waits_for(
     said: list[str] = []
     arm.start(Requesting, configuration=configured)
     arm.run_until(lambda: bool(said.append(capfd.readouterr().err) or "nobody/help" in "".join(said)))
-    assert "waiting for the service nobody/help; start the node 'nobody'" in "".join(said)
+    assert "waiting for the service nobody/help, which no node offers; start the node 'nobody'" in "".join(said)
 
 
 def test_topics_that_answer_each_other_in_a_circle_are_not_streamed(configured: Configuration) -> None:

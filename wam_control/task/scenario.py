@@ -480,7 +480,7 @@ def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: C
     """
     require_settings(where, [step.settings for step in steps], configuration)
     shared = configuration.shared
-    start = shared.arm.joints.start if "driver" in shared.nodes else ()
+    start = shared.arm.joints.start if shared.is_simulated else ()
     loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in shared.nodes else {}
     _require_forces(where, steps, float(loop.get(LARGEST_FORCE, math.inf)))
     _require_motions(where, steps, shared, start, float(loop.get(FOLLOWED, math.inf)))

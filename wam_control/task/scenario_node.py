@@ -42,7 +42,7 @@ class ScenarioNode:
 
     def __init__(self, shared: Shared, own: ScenarioParameters, scenario: Scenario | None = None) -> None:
         self._scenario = scenario or Scenario(load(script_file(own.script), shared), shared)
-        self._covers = shared.arm.covers.names
+        self._covers, self._is_simulated = shared.arm.covers.names, shared.is_simulated
         self._step, self._stamp = "", 0
         self._commands_arm, self._was_enabled = False, False
         self.requests: list[Call | SetParameters] = []
@@ -88,7 +88,7 @@ class ScenarioNode:
         for node in dict.fromkeys(setting.node for setting in out.settings):
             values = {setting.name: _plain(setting) for setting in out.settings if setting.node == node}
             self.requests.append(SetParameters(node, values))
-        if out.done:
+        if out.done and self._is_simulated:  # the time of a real arm cannot be stopped
             self.requests.append(Call("driver", "pause", True))
 
     def refused(self, message: str) -> Outputs:
