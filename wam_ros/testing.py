@@ -74,7 +74,7 @@ def locked_domain() -> Iterator[int]:
 
 
 class Recorded(Mapping[str, Any]):
-    """The messages of a run so far, as arrays, by the topic's name in the table of topics."""
+    """The messages of a run so far, as arrays, by the topic's name; topics without a message are not in it."""
 
     def __init__(self, types: Mapping[str, str]) -> None:
         self._types = types
@@ -82,7 +82,9 @@ class Recorded(Mapping[str, Any]):
         self._made: dict[str, tuple[int, Columns]] = {}
 
     def __getitem__(self, topic: str) -> Any:
-        data = self.data[topic]
+        data = self.data.get(topic)
+        if not data:
+            raise KeyError(f"nothing was recorded on '{topic}' so far; topics with messages: {', '.join(self)}")
         count, columns = self._made.get(topic, (-1, None))
         if columns is None or count != len(data):
             columns = columns_of(self._types[topic], data)
@@ -90,10 +92,10 @@ class Recorded(Mapping[str, Any]):
         return columns
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.data)
+        return (topic for topic, data in self.data.items() if data)
 
     def __len__(self) -> int:
-        return len(self.data)
+        return sum(map(bool, self.data.values()))
 
 
 class RunningArm:

@@ -75,6 +75,8 @@ def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
     sent = arm.recorded["joint_velocity_command"].stamp_ns
     assert sent[-1] - sent[0] == 500_000_000
     assert abs(arm.truth.qd[2]) < 0.01
+    with pytest.raises(KeyError, match=r"nothing was recorded on 'force_command' so far; .*joint_states"):
+        arm.recorded["force_command"]
 
 
 @pytest.mark.parametrize(
