@@ -4,6 +4,7 @@ import argparse
 import asyncio
 import json
 import math
+import os
 import shutil
 import socket
 import subprocess
@@ -266,9 +267,7 @@ def test_an_arm_that_is_not_heard_of_is_not_shown_as_enabled() -> None:
 
 def test_a_page_goes_beside_a_taken_port_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    with socket.socket() as taken:
-        taken.bind((HOST, 0))
-        taken.listen()
+    with socket.create_server((HOST, 0)) as taken:
         port = taken.getsockname()[1]
         monkeypatch.setattr("wam_live.page.LIVE", replace(LIVE, port=port))
         ours = next_free_port(None, said.append)
@@ -573,9 +572,7 @@ def options(*given: str) -> Any:
 
 
 def test_a_page_that_was_asked_for_is_refused_where_there_can_be_none(capsys: pytest.CaptureFixture[str]) -> None:
-    with socket.socket() as taken:
-        taken.bind((HOST, 0))
-        taken.listen()
+    with socket.create_server((HOST, 0)) as taken:
         port = str(taken.getsockname()[1])
         with (
             pytest.raises(NoPageError, match=f"port {port} .* --port"),
@@ -598,9 +595,13 @@ def test_a_page_that_is_late_is_reported_once_and_ends_with_its_stack(
     assert port_is_free(port)
 
 
-def test_nobody_waits_for_a_page_that_is_stopped(domain_id: int) -> None:
-    with page_next_to(options("--port", str(port := free_port())), "wam", lambda: True):
-        assert port_is_free(port)
+def test_a_page_that_loses_its_port_is_reported_at_the_end(domain_id: int, capfd: pytest.CaptureFixture[str]) -> None:
+    port = free_port()
+    with page_next_to(options("--port", str(port)), "wam", lambda: True), socket.create_server((HOST, port)):
+        until(lambda: os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT))
+    said = capfd.readouterr()
+    assert f"port {port} of {HOST} is taken" in said.err
+    assert "ended too early; it printed the reason above" in said.out
 
 
 # a real browser

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -146,11 +146,10 @@ def page_next_to(
         yield lambda: None
         return
     page = PageProcess(port, namespace)
-    try:
+    with ExitStack() as ending:
+        ending.callback(page.close)
         page.wait(is_stopped)
-        yield page.close
-    finally:
-        page.close()
+        yield ending.close
 
 
 class PageProcess:
@@ -176,8 +175,10 @@ class PageProcess:
             time.sleep(0.05)
 
     def close(self) -> None:
-        """End the page."""
-        if self._process.poll() is None:
+        """End the page; report one that has ended before."""
+        if self._process.poll() is not None:
+            _print("the live page ended too early; it printed the reason above")
+        else:
             self._process.terminate()
             try:
                 self._process.wait(PATIENCE)
