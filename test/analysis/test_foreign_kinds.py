@@ -405,6 +405,7 @@ def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: P
     assert {name: numbers.get(name) for name in expected} == pytest.approx(expected, rel=0.02)
     told = " ".join(analysis.sections[1].sentences)
     assert ("is computed from the position: a." in told) is not any("velocity" in one for one in titles)
+    assert ("Not used: speed; rename" in analysis.sections[0].sentences[0]) is ("speed" in titles)
     assert "joints: reception jitter" not in numbers
 
 

@@ -18,7 +18,7 @@ from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
 from wam_analysis.findings.topics import topics_section
 from wam_analysis.foreign.reading import foreign_bag
-from wam_analysis.foreign.tables import series_of_csv, table_bag
+from wam_analysis.foreign.tables import RENAMED, UNUSED, series_of_csv, table_bag
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
@@ -199,7 +199,9 @@ def _foreign_line(recording: AnalysedRecording) -> str:
     joints = {name for one in bag.topics.values() if isinstance(one, JointColumns) for name in one.names}
     wrenches = sum(isinstance(one, WrenchColumns) for one in bag.topics.values())
     held = [counted(len(joints), "joint"), *([counted(wrenches, "wrench topic")] if wrenches else [])]
-    return f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
+    unused = [title for title, kind in bag.types.items() if kind == UNUSED]
+    line = f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
+    return f"{line} Not used: {'; '.join(unused)}; rename each that you need to {RENAMED}." if unused else line
 
 
 def happened_section(recording: AnalysedRecording) -> Section:

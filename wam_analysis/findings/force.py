@@ -85,7 +85,7 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
 
 
 def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
-    """Dynamic range (3.2.1): of the recording, and up to the limits of the arm."""
+    """Dynamic range (3.2.1) of the recording, and the largest force that the arm could give there."""
     known = [(one, accuracy) for one in recording.held if math.isfinite((accuracy := _accuracy(one)).smallest)]
     if not known:
         return []
@@ -93,13 +93,12 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     limit = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
     smallest = max(accuracy.smallest for _, accuracy in known) or math.nan
     largest = max(one.hold.commanded + accuracy.bias for one, accuracy in known)
-    note = "largest force over the largest error; predicted: of the largest possible force"
     by = f"limited by {limit.limited_by}" if limits else ""
     return [
         Finding("largest error, bias plus ripple", "N", smallest),
         Finding("largest held force", "N", largest),
-        Finding("largest possible force", "N", math.nan, limit.force, by),
-        Finding("dynamic range", "", largest / smallest, limit.force / smallest, note),
+        Finding("largest force of motors and cables", "N", math.nan, limit.force, by),
+        Finding("dynamic range", "", largest / smallest, note="largest held force over the largest error"),
     ]
 
 

@@ -9,7 +9,7 @@ from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section
 from wam_analysis.findings.plots import arm_plot
-from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
+from wam_analysis.findings.tabulated import LEGENDS, MARK, Tabulated, tabulated
 from wam_bag.losses import PARAMETERS
 
 # no network access, whatever is in the bag; only the scripts of this page run
@@ -151,9 +151,8 @@ def _table(table: Tabulated) -> str:
         )
 
     rows = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in table.rows)
-    legend = (
-        f"<p><small>{LEGEND}.</small></p>" if any(cell.endswith(MARK) for row in table.rows for cell in row) else ""
-    )
+    marked = [text for mark, text in LEGENDS.items() if any(mark in cell for row in table.rows for cell in row)]
+    legend = "".join(f"<p><small>{text}.</small></p>" for text in marked)
     head = f"<thead><tr>{cells(table.columns, 'th')}</tr></thead>"
     return f'<div class="wide"><table class="numbers">{head}<tbody>{rows}</tbody></table></div>{legend}'
 

@@ -8,7 +8,8 @@ import numpy as np
 from wam_analysis.findings.finding import Finding, shown
 
 MARK = " !"  # after a number more than three standard errors from its prediction
-LEGEND = "! more than three standard errors from its prediction"
+BESIDE = " +- "  # before its standard error
+LEGENDS = {BESIDE: "+- one standard deviation", MARK: "! more than three standard errors from its prediction"}
 
 
 class Tabulated(NamedTuple):
@@ -79,5 +80,5 @@ def _unknown(subject: str, quantity: tuple[str, str], every: Collection[str]) ->
 
 
 def _measured(one: Finding) -> str:
-    error = f" +- {shown(one.error)}" if np.isfinite(one.error) and np.isfinite(one.measured) else ""
+    error = f"{BESIDE}{shown(one.error)}" if np.isfinite(one.error) and np.isfinite(one.measured) else ""
     return ">=" * one.is_lower_bound + shown(one.measured) + error + MARK * one.deviates

@@ -10,7 +10,7 @@ from typing import Any
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding
-from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
+from wam_analysis.findings.tabulated import LEGENDS, Tabulated, tabulated
 from wam_analysis.table import plain
 from wam_analysis.thresholds import LAYOUT
 
@@ -51,9 +51,8 @@ def table_lines(findings: Sequence[Finding], wide: int) -> list[str]:
     for table in tabulated(findings):
         for block in _blocks(table, wide):
             lines += ["", *(f"  {line}".rstrip() for line in block)]
-    if any(MARK in line for line in lines):
-        lines += _wrapped(LEGEND, wide)
-    return lines
+    legends = [legend for mark, legend in LEGENDS.items() if any(mark in line for line in lines)]
+    return lines + [line for legend in legends for line in _wrapped(legend, wide)]
 
 
 def _blocks(table: Tabulated, wide: int) -> list[list[str]]:

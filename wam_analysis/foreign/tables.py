@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_analysis.foreign.clocks import nanoseconds
-from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap, unit_of
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, TopicMap, unit_of
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
 from wam_bag.columns import JOINT_FIELDS, joint_names
 
 TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](.*)[\])]\s*)?")  # and the unit behind it
 DELIMITERS = ",;\t"
+UNUSED = "unused column"  # in place of the type of a topic
+RENAMED = "position.JOINT, velocity.JOINT or effort.JOINT; for a single joint, --map position=COLUMN does it"
 
 
 def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
@@ -64,12 +66,14 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     """
     parts: dict[str, dict[str, Numbers]] = {}
     units = dict(given.units)
+    found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
+    used = {one.title for columns in found.values() for one in columns} | {"index"}  # which a data frame has
     for quantity in (*JOINT_FIELDS, "force", "torque"):
-        columns = _columns(series, quantity, given)
+        columns = found[quantity]
         parts[quantity] = {one.name: one.factor * _numbers(one.values) for one in columns}
         if any(one.has_unit for one in columns):
             units[quantity] = columns[0][:2]
-    clock = next((one for one in _columns(series, "stamp", given) if not one.name), None)
+    clock = next((one for one in found["stamp"] if not one.name), None)
     title = given.fields.get("stamp", "time")
     if clock is None:
         raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
@@ -86,21 +90,20 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
         vectors = (np.column_stack([parts[q].get(n, 0.0 * known) for n in "xyz"])[known] for q in ("force", "torque"))
         topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
     if not topics:
-        raise BagError(
-            f"{path} has the columns {', '.join(map(str, series))}; rename each that you need to position.JOINT, "
-            "velocity.JOINT or effort.JOINT; for a single joint, --map position=COLUMN does it"
-        )
+        raise BagError(f"{path} has the columns {', '.join(map(str, series))}; rename each that you need to {RENAMED}")
     counts = dict.fromkeys(topics, len(times))
-    return Bag(path, topics, dict.fromkeys(topics, "table"), {}, {}, counts), given
+    types = dict.fromkeys(topics, "table") | {str(one): UNUSED for one in series if str(one) not in used}
+    return Bag(path, topics, types, {}, {}, counts), given
 
 
 class _Column(NamedTuple):
-    """A column: factor and shown unit, whether its title has them, the joint or axis in its title, its cells."""
+    """A column: factor and shown unit, whether its title has them, the joint or axis in its title, title, cells."""
 
     factor: float
     shown: str
     has_unit: bool
     name: str
+    title: str
     values: Any
 
 
@@ -119,7 +122,7 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
         if f"{name}.".startswith(f"{wanted}."):
             has_unit = bool(unit) and quantity not in given.units
             factor, shown = unit_of(quantity, unit) if has_unit else given.scaled(quantity)
-            found.append(_Column(factor, shown, has_unit, name[len(wanted) + 1 :], series[title]))
+            found.append(_Column(factor, shown, has_unit, name[len(wanted) + 1 :], str(title), series[title]))
     if len(shown_in := dict.fromkeys(one.shown for one in found)) > 1:
         raise ValueError(f"the columns of {quantity} are in {' and in '.join(shown_in)}; leave out those of one unit")
     return found
