@@ -9,7 +9,7 @@ from wam_analysis.findings.finding import Finding, shown
 
 MARK = " !"  # after a number more than three standard errors from its prediction
 BESIDE = " +- "  # before its standard error
-LEGENDS = {BESIDE: "+- one standard deviation", MARK: "! more than three standard errors from its prediction"}
+LEGENDS = {BESIDE: "+-: one standard deviation", MARK: "! more than three standard errors from its prediction"}
 
 
 class Tabulated(NamedTuple):
