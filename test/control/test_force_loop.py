@@ -1,7 +1,7 @@
 """The outer loop on a world that is computed here: the arm follows its velocity command, springs push back."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
-from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task.motion import GoalMotion
 from wam_description.arm import Arm
@@ -542,23 +541,6 @@ def test_tare_takes_the_present_torques_as_zero_again_and_again(feedback: str) -
     at(2.0, None)
     assert loop.tare() == ""
     assert at(6.0, 5.0).measured == pytest.approx(down(4.0), abs=1e-6)
-
-
-def test_a_payload_that_is_tared_weighs_nothing_in_another_pose() -> None:
-    body, measured, still = RigidBody(ARM), ForceMeasurement(RigidBody(ARM)), [0.0] * 4
-
-    def at(q: Sequence[float], mass: float) -> Any:
-        effort = body.gravity_torque(q) - mass * np.array(ARM.gravity) @ body.tool_jacobian(q)
-        joints = State(list(q), still, effort.tolist())
-        measured.step(replace(OWN, force_filter=0.0), joints, joints, None, None, True, DT)
-        return measured.torques.now
-
-    assert np.abs(at(POSE, 0.3)).max() > 1.0
-    measured.tare()
-    for angle in (-0.5, 0.4):
-        other = [*POSE[:3], POSE[3] + angle]
-        assert at(other, 0.3) == pytest.approx(np.zeros(4), abs=1e-9)
-        assert at(other, 0.5) == pytest.approx(0.2 * np.array(ARM.gravity) @ body.tool_jacobian(other), abs=1e-9)
 
 
 def test_tare_is_refused_while_a_force_is_commanded_the_arm_moves_or_is_where_it_pressed() -> None:
