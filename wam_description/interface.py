@@ -88,7 +88,13 @@ def require_parameters(configuration: Configuration) -> None:
     for entry in shared.nodes:
         one = declared(entry)
         if one.name in configuration.sections:
-            own = configuration.node(one.name, one.parameter_class)
+            try:
+                own = configuration.node(one.name, one.parameter_class)
+            except ParameterError as error:
+                if one.name not in NODES or one.node.__module__.startswith("wam_"):
+                    raise
+                shares = f"node '{entry}' has the name and so the parameters of the packaged node '{one.name}'"
+                raise ParameterError(f"{error}; {shares}: give it another name") from error
             getattr(own, "require_fit", lambda arm: None)(shared.arm)
 
 

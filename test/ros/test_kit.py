@@ -118,9 +118,7 @@ def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
         arm.run(0.1)
     assert arm.run_until_fault() == "emergency stop"
     arm.run(0.1)
-    status = arm.status("driver")
-    assert status
-    assert (status.level, status.fault) == (Level.ERROR, "emergency stop")
+    assert (arm.status("driver").level, arm.status("driver").fault) == (Level.ERROR, "emergency stop")
 
 
 def test_a_node_that_raises_is_named(arm: RunningArm) -> None:

@@ -15,7 +15,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.defects import UnusableOutput, output_check
 from wam_description.event import Level
-from wam_description.interface import Interface, declared
+from wam_description.interface import Interface, declared, require_parameters
 from wam_description.parameters import Nothing, ParameterError
 from wam_description.signals import ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
@@ -142,11 +142,13 @@ def test_a_controller_whose_constructor_raises_is_named_with_its_line(
 
 IMPORTS = "from wam_description.wiring import Input, reaction\nclass Other:\n    "
 STEP = "\n    def step(self, inputs): ...\nclass Mine: ...\n"
+LOOP = 'from test_own_controller import Echo\nclass Mine(Echo): name = "velocity_loop"\n'
 NO_NODES = [
     ("gravitation", "", "no node is named 'gravitation'; nodes: driver, transform"),
     ("no_such_package:Class", "", "check that 'no_such_package' is installed or on PYTHONPATH"),
     ("impedance:ImpedanceParameters", "", "is no node: name and parameters"),
     ("broken_module:Any", "gain = 1 +\n", "node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"),
+    ("my_loop:Mine", LOOP, "unknown .* of the packaged node 'velocity_loop': give it another name"),
     # the faulty one, though another class of the module is configured
     ("no_outputs:Mine", f'{IMPORTS}@reaction(Input("q")){STEP}', r"'no_outputs:Mine' .* TypeError: .*no_outputs\.py:3"),
     ("odd:Mine", f'{IMPORTS}@reaction(Input("q", "p"), outputs=()){STEP}', r"'odd:Mine' .* TypeError: .*odd\.py:3"),
@@ -161,7 +163,7 @@ def test_a_node_that_is_none_is_refused_by_name_and_line(
         (tmp_path / f"{entry.partition(':')[0]}.py").write_text(module)
         monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(ParameterError, match=text):
-        declared(entry)
+        require_parameters(configured.with_values({"nodes": [entry]}))
 
 
 def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(configured: Configuration) -> None:
