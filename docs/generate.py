@@ -114,7 +114,7 @@ def steps(configuration: Configuration) -> str:
     interface = Interface(configuration.with_values({"nodes": [name for name in NODES if name != "recorder"]}).shared)
 
     def named(item: Input) -> str:
-        late = " of `d` before" if item.delayed else " of one outer period before" if item.answers else ""
+        late = " from `d` earlier" if item.delayed else " from one outer period earlier" if item.answers else ""
         return f"`{item.topic}`{late}"
 
     rows = []
