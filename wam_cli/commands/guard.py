@@ -24,6 +24,7 @@ LOOP = {  # option: default, what it is
     "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
     "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
+SERVO = "velocity_loop"
 WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered")  # facts of a running arm
 
 
@@ -70,6 +71,8 @@ def _assess_configuration(configuration: Configuration) -> int:
     facts = {name: value for name, value in report.facts.items() if name not in WHILE_IT_RUNS}
     width = max(map(len, facts))
     print("\n".join([report.message, *(f"  {name:{width}}  {value}" for name, value in facts.items())]))
+    if SERVO not in configuration.shared.nodes:
+        print(f"this is with the packaged {SERVO}, which this configuration does not run")
     return int(report.is_warning)
 
 
