@@ -28,6 +28,7 @@ for elsewhere in (SWITCH, "ROS_LOCALHOST_ONLY"):
     os.environ.pop(elsewhere, None)
 limit_to_this_machine(os.environ)
 
+ON_SOCKETS = {"test_arm_bus", "test_benchmarks", "test_conformance"}  # simulated buses of one computer hear each other
 LONG = 300.0  # s, for what must happen at all, on a machine as busy as may be
 
 
@@ -40,9 +41,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if {"domain_id", "domain_of_module"} & set(getattr(item, "fixturenames", ())):
             item.add_marker("ros")
-        is_shared = isinstance(item, pytest.Function) and _shares_a_fixture(item)
-        if (is_shared or item.get_closest_marker("ros")) and config.pluginmanager.hasplugin("xdist"):
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        name, is_shared = item.path.stem, isinstance(item, pytest.Function) and _shares_a_fixture(item)
+        is_grouped = name in ON_SOCKETS or is_shared or item.get_closest_marker("ros")
+        if is_grouped and config.pluginmanager.hasplugin("xdist"):
+            item.add_marker(pytest.mark.xdist_group("bus" if name in ON_SOCKETS else name))
 
 
 def _shares_a_fixture(item: pytest.Function) -> bool:
