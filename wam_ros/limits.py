@@ -107,7 +107,7 @@ class TestLimits:
     domain_retry: float = 0.05  # s
     patience: float = 300.0  # s of the wall clock, for what must happen at all on a busy machine
     arm_time: float = 10.0  # s of the arm, for a condition
-    lockstep_timeout: float = 5.0  # s for the outputs of a step; while this process does not run, no time is counted
+    lockstep_timeout: float = 15.0  # s for the outputs of a step; while this process does not run, no time is counted
     look: float = 0.05  # s of the wall clock between two looks at a condition while the arm's time does not pass
 
 
