@@ -105,7 +105,11 @@ class PushedArm:
         """
         self._since += dt
         is_new = self._since > own.limits.settling_time
-        pushes = self._pushes(q, axes, torques, contact, chi2)
+        certain = certain_size(torques.now, torques.sd)
+        jacobians = [self._jacobian(q, axes, contact)] if certain else []
+        if certain and chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
+            jacobians.append(likeliest_link(self._body, q, torques.now))
+        pushes = [WorldPush.at(torques.now, certain, jacobian) for jacobian in jacobians]
         hardest = max((push.least for push in pushes), default=0.0)
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
@@ -125,23 +129,6 @@ class PushedArm:
         if float(np.linalg.norm(tool - self._from)) > own.limits.free_travel:
             return []
         return [push.row(allowed, gain, own.joint_speed_limit) for push in pushes]
-
-    def _pushes(
-        self,
-        q: Sequence[float],
-        axes: Sequence[CommandedAxis],
-        torques: WorldTorques,
-        contact: Contact,
-        chi2: float,
-    ) -> list[WorldPush]:
-        """What the torques of the world may be; nothing where they may be none."""
-        certain = certain_size(torques.now, torques.sd)
-        if not certain:
-            return []
-        jacobians = [self._jacobian(q, axes, contact)]
-        if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
-            jacobians.append(likeliest_link(self._body, q, torques.now))
-        return [WorldPush.at(torques.now, certain, jacobian) for jacobian in jacobians]
 
     def _jacobian(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> Array:
         """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""
