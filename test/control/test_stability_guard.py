@@ -15,6 +15,8 @@ from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParam
 from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
 from wam_control.force.stability_guard import GuardedContact, GuardedTask, StabilityGuard
 from wam_control.task.scenario import Push, ScenarioStep
+from wam_control.velocity.servo_guard import ServoGuard
+from wam_control.velocity.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Servo, Timing
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -265,6 +267,17 @@ def test_mode_limit_lowers_the_gains_to_what_a_refusal_allows() -> None:
     assert lowered.assessment.domain is Domain.I
     lowered.retune_servo(TESTBED.shared.servo)
     assert lowered.parameters.force_gain == pytest.approx([allowed], rel=0.01), "of the gain that was given"
+
+
+def test_mode_limit_lowers_the_posture_gain_where_the_velocity_loop_is_too_slow_for_it() -> None:
+    slow, loop = replace(SERVO, proportional_gain=tuple(0.4 * gain for gain in SERVO.proportional_gain)), Loop(OWN)
+    ServoGuard(ARM, CLOCK, WAM.node("velocity_loop", VelocityLoopParameters).guard).require_stable(slow)
+    with pytest.raises(ParameterError, match="lower posture_gain"):
+        loop.retune_servo(slow)
+    loop.tune(guarded(OWN, mode="limit"))
+    loop.retune_servo(slow)
+    assert loop.parameters.posture_gain < 0.5 * OWN.posture_gain
+    assert "lowered to be stable: posture_gain [" in loop.report.message
 
 
 # ------------------------------------------------------------------------------- while it moves

@@ -99,6 +99,7 @@ def test_the_live_parameters_of_a_node_come_first_and_those_of_all_nodes_on_dema
 
 def test_a_push_reaches_the_arm_and_a_wrong_one_is_refused(stack: None) -> None:
     assert called("enable")[0] == 0
+    assert called("tare") == (0, "the present external torques now count as zero in the force loop\n", "")
     code, out, _ = called("push", "outer_link", "0", "12", "0", "--at", "0.3", "--seconds", "0.5")
     assert (code, out.startswith("pushed outer_link with 12 N at 0.30 m")) == (0, True)
     assert "push one of inner_link, outer_link" in called("push", "hand", "0", "0", "1")[2]
@@ -154,11 +155,6 @@ def test_a_push_on_the_inner_link_acts_on_the_axis_of_its_tube() -> None:
     wrench, at, _ = _wrench(given, driver)
     assert at == 0.5
     assert wrench.torque == pytest.approx((-10.0 * 0.5 / 0.5588 * 0.04064, 0.0, 5.0), rel=1e-6)
-
-
-def test_the_tare_is_that_of_the_force_loop(stack: None) -> None:
-    told = "the present external torques now count as zero in the force loop\n"
-    assert called("tare") == (0, told, "")
 
 
 def test_an_arm_that_cannot_be_pushed_is_told_with_what_to_do(stack: None) -> None:

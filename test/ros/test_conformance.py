@@ -4,8 +4,8 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +34,12 @@ PATIENT = 20
 class Bench:
     """A driver and the probe in one process."""
 
-    def __init__(self, ros: Network, folder: Path, configuration: Configuration, make: Callable[..., Any]) -> None:
-        self.ros, self._make = ros, make
+    def __init__(self, ros: Network, folder: Path, configuration: Configuration, make: Any = None) -> None:
+        self.ros, self._make = ros, make or partial(make_node, configuration.shared.nodes[0])
         file = folder / "parameters.yaml"
         file.write_text(configuration.text)
         self._arguments = ["--ros-args", "--params-file", str(file)]
-        shared = configuration.shared
-
-        self.probe = DriverBench(shared, SHARE, 0.4, connection=ros)
+        self.probe = DriverBench(configuration.shared, SHARE, 0.4, connection=ros)
         self.probe.end, self.probe.restart = lambda: ros.remove(self.driver), self.start
         self.start()
 
@@ -113,7 +111,7 @@ def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_ref
     ros: Network, tmp_path: Path
 ) -> None:
     configuration = driver_alone(Configuration.load(packaged("barrett-wam7")))
-    bench = Bench(ros, tmp_path, configuration, lambda **given: make_node("driver", **given))
+    bench = Bench(ros, tmp_path, configuration)
     found = [bench.conformance(PATIENT).row(key) for key in ("refusals", "answers")]
     assert [row.text for row in found if row.verdict != OK] == []
     assert max(map(abs, bench.probe.carrying)) > 0.6, "A, in motor 4"
@@ -125,16 +123,12 @@ def test_the_driver_of_a_real_arm_keeps_the_contract_on_a_simulated_bus(
     ros: Network, tmp_path: Path, joints: int, firmware: int
 ) -> None:
     loaded = on_bus(Configuration.load(packaged(f"barrett-wam{joints}-bus")), f"simulated:{firmware}")
-    configuration = driver_alone(loaded)
-    entry = configuration.shared.nodes[0]
-    assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node(entry, **given))) == []
+    assert wrong(Bench(ros, tmp_path, driver_alone(loaded))) == []
 
 
 @pytest.mark.slow
 def test_the_skeleton_keeps_the_contract(ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    configuration = skeleton(monkeypatch)
-    entry = configuration.shared.nodes[0]
-    assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node(entry, **given))) == []
+    assert wrong(Bench(ros, tmp_path, skeleton(monkeypatch))) == []
 
 
 def test_commanded_torques_are_currents_of_an_arm_with_a_torque_constant_of_one() -> None:

@@ -35,7 +35,7 @@ class Supervision:
     """A parameter set that the guard has admitted; each set has its own object.
 
     With guard.mode `limit` a set that is not stable is lowered to one that is: the saturation in domain II, else
-    the gains.
+    the gains; the gain of the posture where no force gain would be stable with it.
 
     Parameters
     ----------
@@ -91,11 +91,30 @@ class Supervision:
                 if guard.axis(each).force_sd <= parameters.limits.doubt * tolerance(each.force, parameters)
             ]
         task, found = self._assess(contacts)
-        if found.reason and mode == "limit" and found.scale:
-            self.parameters = _accepted(parameters, task.law.group, found.stable_error, guard.accepted_scale(found))
-            task, found = self._assess(contacts)
+        if mode == "limit":
+            if not (found.scale or is_joints):
+                task, found = self._soften(contacts)
+            if found.reason and found.scale:
+                given, group = self.parameters, task.law.group
+                self.parameters = _accepted(given, group, found.stable_error, guard.accepted_scale(found))
+                task, found = self._assess(contacts)
         require(not found.reason or mode == "warn", found.reason)
         self.assessment, self.watch = found, Watch(guard, task, found, parameters.schedule == "position")
+
+    def _soften(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
+        """Lower the gain of the posture until some force gain is stable, and then by `stability_fraction`.
+
+        A velocity loop whose gains are stable by themselves may be too slow for the posture that it has to hold.
+        """
+        given, gain = self.parameters, self.parameters.posture_gain
+        for _ in range(GUARD.halvings):
+            gain *= 0.5
+            self.parameters = replace(given, posture_gain=gain)
+            if self._assess(contacts)[1].scale:
+                self.parameters = replace(given, posture_gain=given.guard.stability_fraction * gain)
+                return self._assess(contacts)
+        self.parameters = given
+        return self._assess(contacts)
 
     def _assess(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
         own = self.parameters
@@ -286,7 +305,7 @@ def _accepted(own: ForceLoopParameters, group: str, stable_error: float, scale: 
 def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:
     """Which parameters were lowered, and to what."""
     names = [one.name for one in fields(given) if getattr(given, one.name) != getattr(taken, one.name)]
-    return "; ".join(f"{name} {listed(getattr(taken, name))}" for name in names)
+    return "; ".join(f"{name} {listed(np.atleast_1d(getattr(taken, name)).tolist())}" for name in names)
 
 
 def _margin(scale: float, largest: float = GUARD.largest_scale) -> str:

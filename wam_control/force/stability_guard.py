@@ -39,7 +39,7 @@ class GuardParameters:
 
     mode: str = parameter(
         "off: no guard; warn: report unstable parameters; refuse: refuse them; limit: lower them, in domain II the "
-        "saturation to the stable error, else the gains",
+        "saturation to the stable error, else the gains, and posture_gain where no force gain is stable with it",
         choices=("off", "warn", "refuse", "limit"),
         live=True,
     )
