@@ -35,6 +35,11 @@ class Code(StrEnum):
     DONE = "done"  # the scenario was played to its end
 
     @property
+    def words(self) -> str:
+        """As a report has it."""
+        return self.replace("_", " ")
+
+    @property
     def number(self) -> int:
         """Its number in `force_axis`."""
         return list(Code).index(self)

@@ -67,7 +67,7 @@ SENTENCES: Final = {  # by cause
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
     "(limits.free_travel): end the command, then begin again",
     # the arm goes on
-    "uncertain": UNCERTAIN + "; the arm presses on: {part_help}",
+    "uncertain": UNCERTAIN + "; the arm keeps pressing: {part_help}",
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
     "measured: command a force that the arm can reach, or bend the arm",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "

@@ -12,6 +12,7 @@ from wam_description.event_text import sentence
 SETTLING_TIME = "limits.settling_time"
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
 REFUSAL = str(Code.REFUSED)
+IN_DOUBT = "applied, but in doubt"  # a force that would be refused, had the arm not pressed with it already
 OUTCOMES = (REFUSAL, TOO_MUCH, UNREACHED)  # of a command that is not met
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
 STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none
@@ -209,7 +210,8 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
     for kind in dict.fromkeys(one.name for one in reactions):
         alike = [one for one in reactions if one.name is kind]
         longest, others = max(alike, key=lambda one: one.end - one.begin), len(alike) - 1
-        verb = REFUSAL if kind is Code.REFUSED else f"{REFUSAL if longest.holds else 'reported'} ({kind})"
+        verb = REFUSAL if longest.holds else IN_DOUBT if kind is Code.REFUSED else "reported"
+        verb += f" ({kind.words})" * (kind is not Code.REFUSED)
         again = f" and {others} more time{'s' * (others > 1)}" if others else ""
         begin, end = ((stamp - zero) / 1e9 for stamp in (longest.begin, longest.end))
         lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {longest.reason}")

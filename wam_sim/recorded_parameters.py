@@ -90,16 +90,22 @@ class RecordedParameters(NamedTuple):
         Raises
         ------
         ParameterError
-            if no node in the bag has such a parameter.
+            if no node in the bag has such a parameter, or a value is not allowed.
         """
         settings: dict[str, Any] = {}
         for key, value in values.items():
             node, colon, name = key.rpartition(":")
             owners = [own for own, flat in self.nodes.items() if name in flat and (own == node or not colon)]
             who = f"node '{node}' has no" if colon else "no node has"
-            require(bool(owners), f"{self.source}: {who} parameter '{name}' in the bag; write [node:]parameter=value")
+            reason = f"{who} parameter '{name}' in {self.source}; write [node:]parameter=value"
+            require(bool(owners), f"--set {key}: {reason}")
             settings |= {f"{own}:{name}": like(self.nodes[own][name], value) for own in owners}
-        return self.with_values(settings)
+        changed = self.with_values(settings)
+        for node in {key.partition(":")[0] for key in settings} & NODES.keys():
+            for cls in (Shared, declared(node).parameter_class):
+                why = _refusal(cls, changed.nodes[node])  # values of another version are refused where they are used
+                require(not why or bool(_refusal(cls, self.nodes[node])), f"--set: {why}")
+        return changed
 
     @property
     def shared(self) -> Shared:
@@ -151,6 +157,15 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
 def _own(values: Values) -> dict[str, Any]:
     """Parameters of the stack, without those that every ROS node has."""
     return {name: value for name, value in values.items() if not name.startswith(OF_ROS)}
+
+
+def _refusal(cls: type, values: Values) -> str:
+    """Why a parameter object cannot have these values, '' if it can."""
+    try:
+        build_part(cls, values)
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def _differences(node: str, recorded: Values) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -293,20 +294,9 @@ def other_units() -> list[Case]:
 
 
 KINDS = (
-    unfilled,
-    other_units,
-    wraps,
-    sparse,
-    coarse,
-    twice,
-    names,
-    called_as_commands,
-    few_cycles,
-    still,
-    zeros,
-    contradictions,
-    formats,
-)
+    unfilled, other_units, wraps, sparse, coarse, twice, names, called_as_commands, few_cycles, still, zeros,
+    contradictions, formats,
+)  # fmt: skip
 CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
 
 
@@ -422,8 +412,32 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
         analyse(table | {"position.b [mm]": columns[1]}, lambda doing: None, given)
 
 
-def test_numbers_that_their_decimal_commas_divide_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "given", "message"),
+    [
+        ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
+        ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
+        ("time,position.a\n0,1\n", topic_map([], [], ["/a"], [], []), "titles command.position.JOINT"),
+        ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
+    ],
+)
+def test_a_table_that_cannot_be_read_as_it_is_meant_is_refused(
+    text: str, given: Any, message: str, tmp_path: Path
+) -> None:
     path = tmp_path / "table.csv"
-    path.write_text("time,position.a\n0,01,1,5\n0,02,1,6\n")
-    with pytest.raises(BagError, match="a row of 4 cells below 2 titles"):
-        analyse(path, lambda doing: None)
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        analyse(path, lambda doing: None, given)
+
+
+@pytest.mark.parametrize(("joints", "name"), [([], "q 2"), (["elbow"], "elbow")])
+def test_a_table_holds_commands_and_one_of_several_joints_has_the_name_of_its_column(
+    joints: list[str], name: str
+) -> None:
+    time, q, _, effort = motion(100.0, 0.7, 0.5)
+    table = {"time": time, "q 1": 0.0 * q, "q 2": q, "command.q 2": 0.5 * np.sin(1.4 * math.pi * time), "tau 2": effort}
+    found = analyse(table, lambda doing: None, topic_map([], joints, [], ["position=q 2", "effort=tau 2"], []))
+    told = " ".join(sentence for section in found.sections for sentence in section.sentences)
+    assert re.search(rf"{name} repeats at 0.7 Hz.*, as it was commanded", told)
+    assert "Taken as commands: joints_command" in told
+    assert "Not used: q 1;" in told

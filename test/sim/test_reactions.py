@@ -84,7 +84,10 @@ def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tm
     assert str(answer) == "commands carried out: NO (1 refused, 1 not reached)"
     analysis = analyse_bag(read(tmp_path / "bag"), lambda stage: None)
     sections = {section.key: section for section in analysis.sections}
-    assert "NOT REACHED in the end: nothing there." in sections["steps"].wrong
+    assert sections["steps"].wrong == [
+        "Failed: commands carried out (1 refused, 1 not reached).",
+        "Not reached at the end of: nothing there.",
+    ]
 
 
 @pytest.mark.slow
@@ -101,7 +104,7 @@ def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[A
     summary, analysis = found
     begins = {step.name: step.begin / 1e9 for step in summary.steps}
     sections = {section.key: section for section in analysis.sections}
-    (said,) = (line for line in sections["force"].wrong if line.startswith("REFUSED"))
+    (said,) = (line for line in sections["force"].wrong if line.startswith("Not applied"))
     for name, (kind, reason) in REFUSED.items():
         assert any(line.startswith(name) and reason in line for line in sections["force"].sentences), name
         assert f"({kind} at {begins[name]:.2f} s)" in said or f"({kind} at {begins[name] + 0.005:.2f} s)" in said
@@ -128,6 +131,7 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(
 def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[AnalysedRecording, Analysis]) -> None:
     told = " ".join(text(found[1]).split())
     assert "force within 10 %: NO (4 of 6 refused)" in told
+    assert "Wrong: Failed: force within 10 % (4 of 6 refused)" in told
     for name, (kind, _) in REFUSED.items():
         assert re.search(rf" {name}(, axis \d)?: {kind} from", told)
 
@@ -163,5 +167,5 @@ def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
     assert len(within([late], 0, 1_000_000_000)) == 1
     lasting = RecordedReaction(2_000_000_000, 4_000_000_000, Event(Code.NOT_REACHED, values={"reason": "so"}))
     assert sentences("press", [late, lasting], 0) == [
-        "press: reported (not_reached) from 2.00 to 4.00 s and 1 more time: so"
+        "press: reported (not reached) from 2.00 to 4.00 s and 1 more time: so"
     ]

@@ -257,13 +257,15 @@ def test_a_hole_in_an_input_is_named(bag: Path, tmp_path: Path, capsys: pytest.C
     assert "where an input was lost, gravity has no output" in said
 
 
-def test_a_parameter_to_set_that_is_not_in_the_bag_is_refused_by_name(bag: Path) -> None:
-    for name, said in (
-        ("force_loop:gain", "node 'force_loop' has no parameter 'gain'"),
-        ("nonsense", "no node has parameter"),
+def test_a_parameter_that_cannot_be_set_is_refused_as_one_of_the_option(bag: Path) -> None:
+    for name, value, said in (
+        ("force_loop:gain", 1.0, "--set force_loop:gain: node 'force_loop' has no parameter 'gain'"),
+        ("nonsense", 1.0, "--set nonsense: no node has parameter"),
+        ("force_loop:force_gain", -1.0, "--set: parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
+        ("timing.period", "fast", "--set: parameter 'timing.period' is 'fast'"),
     ):
         with pytest.raises(ParameterError, match=said):
-            replay(bag, "force_loop", values={name: 1.0})
+            replay(bag, "gravity", values={name: value})
 
 
 def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:

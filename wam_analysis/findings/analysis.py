@@ -177,7 +177,7 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
     wrong = [sentence for section in sections for sentence in section.wrong]
     shows = [sentence for section in sections for sentence in section.shows]
     lines = (
-        _line("Wrong", wrong, "no defect was found.", "defect"),
+        _line("Wrong", wrong, "nothing was found.", "defect"),
         _line("Shows", shows, "nothing that can be evaluated.", "result"),
     )
     return Section("verdict", "Verdict", (what, *lines))

@@ -14,6 +14,10 @@ from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers
 
+RECORD = (
+    "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
+    "and fast, for some ten seconds, while nothing touches the arm."
+)
 WEIGHT, DRAG = "weight", "drag"
 ALSO = {
     WEIGHT: "the fit includes the joint's weight",
@@ -60,7 +64,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not sentences:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
-        return Section("friction", "Friction", (why, *doubts, *wrong), wrong=wrong)
+        return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
+    doubts += [RECORD] * bool(doubts)
     assumed = (
         "The fit explains the effort by friction and inertia. Where they explain more, it includes the joint's weight, "
         "a drag by the square of the velocity, and a delay. What it leaves out makes the standard errors larger."

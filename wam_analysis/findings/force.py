@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
@@ -14,18 +14,15 @@ from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
 from wam_control.force.thresholds import GUARD
+from wam_description.event import Code
 from wam_description.signals import BASE
-from wam_sim.reactions import (
-    STEADY,
-    RecordedReaction,
-    of_force_loop,
-    within,
-)
+from wam_sim.reactions import IN_DOUBT, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
-WHOSE = "The force loop measures the force. The contact estimator estimates it."
+WHOSE = "Measured force: that of the force loop. Estimated force: that of the contact estimator."
+NOT_APPLIED, ELSE = "Not applied, the arm held its position", "Reported by the force loop"
 NO_FORCE = f"No constant force was commanded for {HOLD.shortest:g} s"
 
 
@@ -61,15 +58,13 @@ def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedRe
 
 def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int) -> list[str]:
     """What was refused, and what was reported of others, in a sentence each."""
-    verdict = []
-    for holds, what in ((True, "REFUSED"), (False, "Reported while pressing")):
-        named = [
-            f"{name} ({one.name} at {(one.begin - zero) / 1e9:.2f} s)"
-            for name, reactions in found.items()
-            for one in {one.name: one for one in reversed(reactions) if one.holds is holds}.values()
-        ]
-        verdict += [f"{what}: {'; '.join(named)}."] if named else []
-    return verdict
+    alike: dict[str, dict[tuple[str, Code], str]] = {what: {} for what in (NOT_APPLIED, stated(IN_DOUBT)[:-1], ELSE)}
+    for name, reactions in found.items():
+        for one in reactions:
+            what = ELSE if one.name is not Code.REFUSED else stated(IN_DOUBT)[:-1]
+            text = f"{name} ({one.name.words} at {(one.begin - zero) / 1e9:.2f} s)"
+            alike[NOT_APPLIED if one.holds else what].setdefault((name, one.name), text)
+    return [f"{what}: {'; '.join(named.values())}." for what, named in alike.items() if named]
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
@@ -186,6 +181,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     sentences: list[str] = []
     findings: list[Finding] = []
     verdict: list[str] = []
+    wrong: list[str] = []
     refused = [one.hold.name for one in recording.held if one.hold.is_refused]
     held = [one for one in recording.held if not one.hold.is_refused]
     if refused:
@@ -194,16 +190,20 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         theory = recording.theories[one.hold.name]
         found = [_fate(one)[0], *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]
         sentences += [sentence for sentence in found if sentence not in sentences]
-        verdict += filter(None, [_fate(one)[1]])
+        (wrong if _diverges(one) else verdict).extend(filter(None, [_fate(one)[1]]))
         findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory)]
     if not held and not refused:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
-    margin = f", guard margin {shown(min(margins))}" if margins else ""
-    if settled and not verdict:
+    margin = f", by the guard up to {shown(min(margins))} times the gains are stable" if margins else ""
+    if settled and not verdict and not wrong:
         verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
-    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, by_gains=True)
+    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong, by_gains=True)
+
+
+def _diverges(one: HeldForce) -> bool:
+    return one.swinging is not None and one.swinging.swings.verdict is Verdict.DIVERGED
 
 
 def _fate(one: HeldForce) -> tuple[str, str]:

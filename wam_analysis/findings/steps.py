@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_list import NO_LINK
-from wam_analysis.findings.finding import Section
+from wam_analysis.findings.finding import Section, stated
 from wam_analysis.findings.held_force import HeldForce
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, TOUCH
@@ -54,10 +54,13 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     """Whether the commands of a scenario were carried out; None without a scenario."""
     if not recording.steps:
         return None
-    outcomes, (brief, why) = _outcomes(recording), recording.unassessed
-    wrong = [f"{what.upper()} in the end: {'; '.join(outcomes[what])}." for what in OUTCOMES[1:] if outcomes[what]]
+    outcomes, (brief, why), answers = _outcomes(recording), recording.unassessed, verdict(recording)
+    failed = [f"{one.question} ({one.worst})" for one in answers if one.result is VerdictResult.NO]
+    wrong = [f"Failed: {', '.join(failed)}."] if failed else []
+    missed = {what: outcomes[what] for what in OUTCOMES[1:] if outcomes[what]}
+    wrong += [stated(f"{what} at the end of: {'; '.join(steps)}") for what, steps in missed.items()]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
-    return Section("steps", "Result of the steps", (HOW, *(f"{answer}." for answer in verdict(recording))), wrong=wrong)
+    return Section("steps", "Result of the steps", (HOW, *(f"{answer}." for answer in answers)), wrong=wrong)
 
 
 def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:

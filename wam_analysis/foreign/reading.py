@@ -56,10 +56,15 @@ def _analysed(bag: Bag, given: TopicMap) -> Bag:
             topics[part] = found
             is_command = part in given.commands or (bag.types[name] == CONTROLLER and part != name)
             types[part] = COMMAND if is_command else bag.types[name]
-    joints = sorted({joint for one in topics.values() if isinstance(one, JointColumns) for joint in one.names})
+    return checked(bag._replace(topics=topics, types=types), given)
+
+
+def checked(bag: Bag, given: TopicMap) -> Bag:
+    """The bag; raises ValueError if it has not all joints of the map."""
+    joints = sorted({joint for one in bag.topics.values() if isinstance(one, JointColumns) for joint in one.names})
     if unknown := [name for name in given.joints if name not in joints]:
         raise ValueError(f"{bag.path} has no joint {unknown[0]}; its joints: {', '.join(joints) or 'none'}")
-    return bag._replace(topics=topics, types=types)
+    return bag
 
 
 def _is_wanted(topic: str, kind: str, given: TopicMap) -> bool:

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_analysis.foreign.clocks import nanoseconds
+from wam_analysis.foreign.reading import COMMAND, checked
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, TopicMap, unit_of
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
@@ -17,6 +18,8 @@ from wam_bag.columns import JOINT_FIELDS, joint_names
 
 TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](.*)[\])]\s*)?")  # and the unit behind it
 DELIMITERS = ",;\t"
+COMMANDED = "command."  # begins the title of a column that was commanded
+COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
 UNUSED = "unused column"  # in place of the type of a topic
 RENAMED = "position.JOINT, velocity.JOINT or effort.JOINT; for a single joint, --map position=COLUMN does it"
 
@@ -43,11 +46,14 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
         )
+    _require_once(path, head)
     return dict(zip(head, zip_longest(*rows, fillvalue=""), strict=False))
 
 
 def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_GIVEN) -> tuple[Bag, TopicMap]:
     """A recording of a table with 'time', s, and columns as position.JOINT, velocity.JOINT, effort.JOINT or force.x.
+
+    Commands are in columns as command.position.JOINT or command.force.x.
 
     Parameters
     ----------
@@ -62,49 +68,86 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     Raises
     ------
     BagError
-        if it has no time, or nothing that can be analysed.
+        if it has no time, nothing that can be analysed, or a title twice.
+    ValueError
+        if a topic is given, or a joint that it has not.
     """
-    parts: dict[str, dict[str, Numbers]] = {}
+    if given.topics or given.commands:
+        raise ValueError(f"{path} is a table and has no topics: leave out --topic and --command. {COMMANDS}")
+    _require_once(path, [str(title) for title in series])
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     used = {one.title for columns in found.values() for one in columns} | {"index"}  # which a data frame has
     for quantity in (*JOINT_FIELDS, "force", "torque"):
-        columns = found[quantity]
-        parts[quantity] = {one.name: one.factor * _numbers(one.values) for one in columns}
-        if any(one.has_unit for one in columns):
-            units[quantity] = columns[0][:2]
+        if any(one.has_unit for one in found[quantity]):
+            units[quantity] = found[quantity][0][:2]
     clock = next((one for one in found["stamp"] if not one.name), None)
     title = given.fields.get("stamp", "time")
     if clock is None:
         raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
-    nothing = np.full(len(times), "", object)
     topics: dict[str, Any] = {}
-    joints = tuple(dict.fromkeys(name for q in JOINT_FIELDS for name in parts[q]))
-    blank = np.full(len(known), np.nan)
-    if joints:
-        p, v, e = (np.column_stack([parts[q].get(n, blank) for n in joints])[known] for q in JOINT_FIELDS)
-        topics["joints"] = JointColumns(times, times, nothing, joint_names(joints, 0), p, v, e)
-    if parts["force"] or parts["torque"]:
-        vectors = (np.column_stack([parts[q].get(n, 0.0 * known) for n in "xyz"])[known] for q in ("force", "torque"))
-        topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
+    for is_command, suffix in ((False, ""), (True, "_command")):
+        parts = {q: {one.name: one for one in columns if one.is_command is is_command} for q, columns in found.items()}
+        topics |= {f"{name}{suffix}": one for name, one in _topics(parts, times, known, given)}
     if not topics:
         raise BagError(f"{path} has the columns {', '.join(map(str, series))}; rename each that you need to {RENAMED}")
-    counts = dict.fromkeys(topics, len(times))
-    types = dict.fromkeys(topics, "table") | {str(one): UNUSED for one in series if str(one) not in used}
-    return Bag(path, topics, types, {}, {}, counts), given
+    types = {topic: COMMAND if topic.endswith("_command") else "table" for topic in topics}
+    types |= {str(one): UNUSED for one in series if str(one) not in used}
+    return checked(Bag(path, topics, types, {}, {}, dict.fromkeys(topics, len(times))), given), given
+
+
+def _topics(
+    parts: Mapping[str, Mapping[str, "_Column"]], times: Times, known: Mask, given: TopicMap
+) -> Iterator[tuple[str, JointColumns | WrenchColumns]]:
+    """The joints and the wrench of some columns by quantity and name, at their times."""
+    nothing = np.full(len(times), "", object)
+
+    def stacked(quantity: str, names: Iterable[str], absent: float) -> Numbers:
+        blank = np.full(len(known), absent)
+        own = parts[quantity]
+        return np.column_stack([own[n].numbers if n in own else blank for n in names])[known]
+
+    if joints := tuple(dict.fromkeys(name for q in JOINT_FIELDS for name in parts[q])):
+        mapped = [_split(given.fields[q])[0] for q in JOINT_FIELDS if q in given.fields]
+        alone = given.joints[0] if len(given.joints) == 1 else next(iter(mapped), "")
+        names = joint_names([name or alone for name in joints], 0)
+        p, v, e = (stacked(q, joints, np.nan) for q in JOINT_FIELDS)
+        yield "joints", JointColumns(times, times, nothing, names, p, v, e)
+    if parts["force"] or parts["torque"]:
+        yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz", 0.0) for q in ("force", "torque")))
+
+
+def _require_once(path: Path, titles: Sequence[str]) -> None:
+    """Refuse a table in which two columns have one title."""
+    if twice := [one for i, one in enumerate(titles) if one.strip() and one in titles[:i]]:
+        raise BagError(f"{path} has two columns '{twice[0]}'; give each a title of its own")
 
 
 class _Column(NamedTuple):
-    """A column: factor and shown unit, whether its title has them, the joint or axis in its title, title, cells."""
+    """A column of a quantity.
+
+    Attributes
+    ----------
+    factor, shown, has_unit : factor and shown unit, and whether its title has them.
+    name : joint or axis in its title, '' for none.
+    is_command : whether it was commanded.
+    title, values : its title, and its cells.
+    """
 
     factor: float
     shown: str
     has_unit: bool
     name: str
+    is_command: bool
     title: str
     values: Any
+
+    @property
+    def numbers(self) -> Numbers:
+        """Its numbers in the unit that is shown."""
+        return self.factor * _numbers(self.values)
 
 
 def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[_Column]:
@@ -118,11 +161,13 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
     wanted, _ = _split(given.fields.get(quantity, "time" if quantity == "stamp" else quantity))
     found = []
     for title in series:
-        name, unit = _split(str(title))
+        whole, unit = _split(str(title))
+        name = whole.removeprefix(COMMANDED)
         if f"{name}.".startswith(f"{wanted}."):
             has_unit = bool(unit) and quantity not in given.units
             factor, shown = unit_of(quantity, unit) if has_unit else given.scaled(quantity)
-            found.append(_Column(factor, shown, has_unit, name[len(wanted) + 1 :], str(title), series[title]))
+            own = name[len(wanted) + 1 :]
+            found.append(_Column(factor, shown, has_unit, own, name != whole, str(title), series[title]))
     if len(shown_in := dict.fromkeys(one.shown for one in found)) > 1:
         raise ValueError(f"the columns of {quantity} are in {' and in '.join(shown_in)}; leave out those of one unit")
     return found
