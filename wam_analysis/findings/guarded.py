@@ -76,9 +76,6 @@ def sentence(found: Guarded) -> str:
     text = f"Stability guard (sampled loop with its velocity loops, {surface}, {found.posture}): domain"
     if assessment.scale >= 1.0:
         return f"{text} {assessment.domain}, linearly stable with up to {shown(assessment.scale)} times these gains."
-    error = shown(assessment.stable_error, "N")
-    friction = f"; friction keeps it stable for errors up to {error}" * (assessment.stable_error > 0.0)
     return (
-        f"{text} {assessment.domain}, NOT linearly stable with more than {shown(assessment.scale)} times these "
-        f"gains{friction}."
+        f"{text} {assessment.domain}, NOT linearly stable with more than {shown(assessment.scale)} times these gains."
     )

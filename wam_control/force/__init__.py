@@ -15,7 +15,6 @@
 ``force_loop_parameters``  its parameters
 ``force_measurement``      the external torques, by the feedback that is chosen; low pass
 ``force_watch``            the six events, each by a condition that lasts
-``friction_trial``         the sampled loop with saturation and friction, for an arm of one joint
 ``friction_verdict``       domain, stable error and limit cycle of one friction node, chapter 5
 ``guard``                  admits a parameter set, scales its gains while the arm moves, reports
 ``guarded``                what is controlled, as the guard sees it

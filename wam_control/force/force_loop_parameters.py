@@ -153,12 +153,6 @@ class ForceLoopParameters:
         "m",
         high=1.0,
     )
-    schedule: str = parameter(
-        "off: constant gains; position: the gains follow the estimated contact position, so that the margin is the "
-        "one at contact_position; if the estimate is uncertain, the worst position counts",
-        choices=("off", "position"),
-        live=True,
-    )
     link_probability_limit: float = tunable(
         "least probability of the estimated link with which its contact position is used", high=1.0
     )

@@ -34,8 +34,8 @@ Triple = tuple[float, float, float]
 class Supervision:
     """A parameter set that the guard has admitted; each set has its own object.
 
-    With guard.mode `limit` a set that is not stable is lowered to one that is: the saturation in domain II, else
-    the gains; the gain of the posture where no force gain would be stable with it.
+    With guard.mode `limit` the gains of a set that is not stable are lowered to stable ones, and the gain of the
+    posture where no force gain would be stable with it.
 
     Parameters
     ----------
@@ -95,11 +95,10 @@ class Supervision:
             if not (found.scale or is_joints):
                 task, found = self._soften(contacts)
             if found.reason and found.scale:
-                given, group = self.parameters, task.law.group
-                self.parameters = _accepted(given, group, found.stable_error, guard.accepted_scale(found))
+                self.parameters = _accepted(self.parameters, task.law.group, guard.accepted_scale(found))
                 task, found = self._assess(contacts)
         require(not found.reason or mode == "warn", found.reason)
-        self.assessment, self.watch = found, Watch(guard, task, found, parameters.schedule == "position")
+        self.assessment, self.watch = found, Watch(guard, task, found)
 
     def _soften(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
         """Lower the gain of the posture until some force gain is stable, and then by `stability_fraction`.
@@ -159,38 +158,31 @@ class Supervision:
 class Watch:
     """Follows the arm and gives the factor by which the gains are scaled.
 
-    Without scheduling the factor is 1, or less where the parameters would leave their domain.  With it
-    the margin stays the one where they were tuned; no factor takes them above `stability_fraction` of it.
+    The factor is 1, or less where the parameters would leave their domain.
 
     Parameters
     ----------
     guard : computes the margins.
     task : what is controlled, with the gains in force.
     found : assessment of these gains when they were tuned.
-    is_scheduled : whether the gains follow the contact position.
 
     Attributes
     ----------
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
-    largest : factor that is tried at most, so that a `scale` of this size is a least one.
+    needed : factor that is demanded, and tried at most, so that a `scale` of this size is a least one.
     assessed : contacts of the last assessment, none before the first; another list after each.
     """
 
-    def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment, is_scheduled: bool) -> None:
-        self._guard, self._task, self._is_scheduled = guard, task, is_scheduled
-        demanded = 1.0 / guard.parameters.stability_fraction
-        # gains without any margin are only taken where the guard warns: there is none to keep
-        self._tuned = found.scale or demanded
-        # in domain II the margin is less than the fraction demands, and may stay so
-        self._needed = min(self._tuned, demanded)
+    def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment) -> None:
+        self._guard, self._task = guard, task
+        self.needed = 1.0 / guard.parameters.stability_fraction
         self.assessed: list[GuardedContact] = []
         self._pending: list[GuardedContact] = []
         self._work: Iterator[float] | None = None
         self._least = math.inf
         self._since = math.inf
         self.factor, self.scale = 1.0, found.scale
-        self.largest = GUARD.largest_scale if is_scheduled else self._needed
 
     def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
         """Continue the present assessment, or begin one if it is due; True if the factor has changed.
@@ -207,7 +199,7 @@ class Watch:
             contacts = [contact for each in guarded for contact in each.contacts]
             if contacts and self._is_new(contacts):
                 self._pending, self._least = contacts, math.inf
-                self._work = self._guard.scales(self._task, guarded, self._tried())
+                self._work = self._guard.scales(self._task, guarded, [part * self.needed for part in GUARD.scales])
         if self._work is None:
             return False
         try:
@@ -215,16 +207,8 @@ class Watch:
             return False
         except StopIteration:
             self._work, self.assessed, self.scale = None, self._pending, self._least
-        before = self.factor
-        allowed = self.scale / self._needed
-        self.factor = min(allowed, self.scale / self._tuned) if self._is_scheduled else min(allowed, 1.0)
+        before, self.factor = self.factor, min(self.scale / self.needed, 1.0)
         return self.factor != before
-
-    def _tried(self) -> list[float]:
-        return [
-            part * self.largest
-            for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else GUARD.scales)
-        ]
 
     def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
         return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
@@ -271,7 +255,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "guard": mode,
         "domain": str(assessment.domain),
         "margin": _margin(assessment.scale),
-        "margin here": _margin(here, watch.largest if watch.assessed else GUARD.largest_scale),
+        "margin here": _margin(here, watch.needed if watch.assessed else GUARD.largest_scale),
         "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
         if watch.assessed
         else UNKNOWN,
@@ -279,9 +263,6 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "lowered": lowered or "nothing",
         "worst": assessment.where,
         f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",
-        f"largest stable saturation [{force}]": "no limit"
-        if math.isinf(assessment.stable_error)
-        else f"{assessment.stable_error:.4g}",
         f"limit cycle [{force}]": f"{cycle.peak_to_peak:.4g}",
         "limit cycle [s]": f"{cycle.period:.4g}",
         f"deadband that removes it [{force}]": f"{cycle.deadband:.4g}",
@@ -290,15 +271,10 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
     return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
 
 
-def _accepted(own: ForceLoopParameters, group: str, stable_error: float, scale: float) -> ForceLoopParameters:
-    """The set that the reason of a refusal advises: a lower saturation in domain II, else gains lower by a scale."""
-    values: dict[str, Any] = {}
-    if stable_error:
-        name = f"{group}_error_limit"
-        values[name] = tuple(min(limit, stable_error) for limit in getattr(own, name))
-    else:
-        for name in (f"{group}_gain", f"{group}_proportional_gain"):
-            values[name] = tuple(scale * gain for gain in getattr(own, name))
+def _accepted(own: ForceLoopParameters, group: str, scale: float) -> ForceLoopParameters:
+    """The set that the reason of a refusal advises: gains lower by a scale."""
+    names = f"{group}_gain", f"{group}_proportional_gain"
+    values: dict[str, Any] = {name: tuple(scale * gain for gain in getattr(own, name)) for name in names}
     return replace(own, **values)
 
 

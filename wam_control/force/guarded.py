@@ -12,7 +12,7 @@ from wam_control.force.guard import Supervision
 from wam_control.force.problem import linear
 from wam_control.force.stability_guard import Guarded, GuardedContact, GuardedForces
 from wam_control.force.task import AxisKind, TaskAxis
-from wam_control.force.thresholds import FORCE, GUARD
+from wam_control.force.thresholds import FORCE
 from wam_description.signals import Contact
 
 
@@ -26,8 +26,6 @@ def guarded(
 ) -> list[Guarded]:
     """Where the commanded axes press: at all contacts at once; nothing where nothing is sensed at a point.
 
-    Where the gains follow a position that is not known, it is looked for at several ones.
-
     Parameters
     ----------
     q : joint angles (n,), rad.
@@ -37,22 +35,10 @@ def guarded(
     own : parameters of the force loop.
     supervision : its gains.
     """
-    covers = forces.covers
     if own.mode == "joint_torque" and all(axis.is_joint for axis in axes):  # they press wherever something is
-        place = ContactPlace(covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
-        positions = [(place.position, place.position_sd)]
-        if own.schedule == "position" and not place.is_known:
-            positions = [(part * covers.length_of(place.cover), 0.0) for part in GUARD.positions]
-        return [each for position in positions for each in supervision.contacts(q, place.cover, *position)]
-    at = axes[0].place
-    if own.schedule != "position" or len(axes) > 1 or at is None or at.is_known:
-        return list(_linear(q, axes, own, supervision))
-    found: list[Guarded] = []
-    for part in GUARD.positions:
-        there = at._replace(position=part * covers.length_of(at.cover), position_sd=0.0)
-        sensed = forces.axis(q, there.pressed(axes[0].direction, axes[0].desired))
-        found += _linear(q, [axes[0]._replace(sensed=sensed, along=sensed.lever, place=there)], own, supervision)
-    return found
+        place = ContactPlace(forces.covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
+        return list(supervision.contacts(q, place.cover, place.position, place.position_sd))
+    return list(_linear(q, axes, own, supervision))
 
 
 def _linear(

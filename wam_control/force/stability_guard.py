@@ -3,13 +3,12 @@
 The linear part is the whole sampled loop of `wam_control.force.sampled_loop`, rotors, cables, velocity
 loop, hold and delay, in contact with every stiffness up to the largest.  Below its margin no set
 of parameters can diverge, whatever the friction (domain I).  Above it, friction may still stabilise
-the loop for small errors (domain II); the guard relies on that for an arm of one joint only, and
-never above the saturation found stable.
+the loop for small errors (domain II); the guard does not rely on that.
 """
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force.force_law import ForceLaw
-from wam_control.force.friction_trial import FrictionTrial
 from wam_control.force.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
 from wam_control.force.thresholds import FORCE, GUARD
@@ -38,8 +36,8 @@ class GuardParameters:
     """Assumptions of the guard, and its reaction to unstable parameters."""
 
     mode: str = parameter(
-        "off: no guard; warn: report unstable parameters; refuse: refuse them; limit: lower them, in domain II the "
-        "saturation to the stable error, else the gains, and posture_gain where no force gain is stable with it",
+        "off: no guard; warn: report unstable parameters; refuse: refuse them; limit: lower the gains, and "
+        "posture_gain where no force gain is stable with it",
         choices=("off", "warn", "refuse", "limit"),
         live=True,
     )
@@ -144,7 +142,6 @@ class GuardAssessment(NamedTuple):
     ----------
     domain : of figure 5.8; below `stability_fraction` of the linear margin counts as I.
     scale : factor of the gains at which the loop becomes linearly unstable, up to `largest_scale`.
-    stable_error : largest saturation accepted, N or N m; infinite in domain I, 0 where none is.
     stiffness : k_tr k_c/(k_tr + k_c) at the contact or the joint, N/m or N m/rad.
     cycle : stiction limit cycle by (5.8) and (5.9).
     where : the worst contact: joint or direction of the force, position and posture.
@@ -153,7 +150,6 @@ class GuardAssessment(NamedTuple):
 
     domain: Domain
     scale: float
-    stable_error: float
     stiffness: float
     cycle: PredictedCycle
     where: str
@@ -250,7 +246,7 @@ class StabilityGuard:
         law = task.law
         if not contacts or not any((*law.gain, *law.proportional_gain)):
             return GuardAssessment(
-                Domain.I, GUARD.largest_scale, math.inf, 0.0, PredictedCycle(0.0, 0.0, 0.0), "nothing is controlled", ""
+                Domain.I, GUARD.largest_scale, 0.0, PredictedCycle(0.0, 0.0, 0.0), "nothing is controlled", ""
             )
         scale, contact = min((min(self.scales(task, [each])), each) for each in contacts)
         nodes = {name: self.node(task, contact, i) for i, name in enumerate(law.names)}
@@ -261,8 +257,8 @@ class StabilityGuard:
         what = name if task.is_joints else f"force along {listed(contact.direction)} in the base frame"
         where = f"{what} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
         domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
-        found = GuardAssessment(domain, scale, math.inf, float(series_stiffness(ktr, kc)), cycles[name], where, "")
-        return found if domain is Domain.I else self._beyond(task, contact, found)
+        found = GuardAssessment(domain, scale, float(series_stiffness(ktr, kc)), cycles[name], where, "")
+        return found if domain is Domain.I else found._replace(reason=self._refusal(law, found))
 
     def accepted_scale(self, found: GuardAssessment) -> float:
         """Factor of the gains up to which they are accepted as domain I."""
@@ -301,49 +297,21 @@ class StabilityGuard:
             static_friction=friction(joints.static_friction),
         )
 
-    def _beyond(self, task: GuardedTask, contact: GuardedContact, found: GuardAssessment) -> GuardAssessment:
-        """The task above its linear margin: what would be accepted."""
-        share, law = self.parameters.stability_fraction, task.law
-        group = law.group
-        error, domain = 0.0, found.domain
-        if len(self._arm.joints.names) == 1:
-            error = self._stable_error(task, contact)
-            domain = Domain.II if error else Domain.III
-        found = found._replace(domain=domain, stable_error=error)
-        if max(law.error_limit) <= error:
-            return found
-        most = self.accepted_scale(found)
-        allowed = f"{group}_gain up to {listed([rounded_down(most * gain) for gain in law.gain])}"
-        if error:
-            allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
-        reason = (
-            f"{group}_gain {listed(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
-            f"one: domain {domain}; allowed: {allowed}; guard.stability_fraction is {share:g}; worst case: "
-            f"{found.where}, contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
-        )
+    def _refusal(self, law: ForceLaw, found: GuardAssessment) -> str:
+        """Why gains above their linear margin are refused, and what would be accepted."""
+        gain, most = f"{law.group}_gain", self.accepted_scale(found)
+        surface = f"contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         if not found.scale:
-            also = f"{group}_proportional_gain, " if any(law.proportional_gain) else ""
-            reason = (
-                f"{group}_gain {listed(law.gain)} is not stable, nor is a hundredth of it "
-                f"({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, {also}"
-                f"or guard.contact_stiffness"
+            also = f"{law.group}_proportional_gain, " if any(law.proportional_gain) else ""
+            return (
+                f"{gain} {listed(law.gain)} is not stable, nor is a hundredth of it ({found.where}, {surface}); lower "
+                f"posture_gain, {also}or guard.contact_stiffness"
             )
-        return found._replace(reason=reason)
-
-    def _stable_error(self, task: GuardedTask, contact: GuardedContact) -> float:
-        """Largest saturation with which friction stabilises the loop of one joint, in every contact."""
-        law = task.law
-        node = self.node(task, contact, 0)
-        least = math.inf
-        for late in {0, self.parameters.extra_delay}:
-            axes = self._axes(task, contact, late)
-            for part in self._parts(task):
-                softer = replace(node, contact_stiffness=part * node.contact_stiffness)
-                cycle = stiction_cycle(softer, max(law.gain)).peak_to_peak
-                stiffness = part * self._stiffness(contact)
-                trial = FrictionTrial(self._loop, contact.q, axes, stiffness, task.feedback, softer, max(law.deadband))
-                least = min(least, trial.stable_error(cycle))
-        return least
+        return (
+            f"{gain} {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one: domain "
+            f"{found.domain}; allowed: {gain} up to {listed([rounded_down(most * each) for each in law.gain])}; "
+            f"guard.stability_fraction is {self.parameters.stability_fraction:g}; worst case: {found.where}, {surface}"
+        )
 
     def _delays(self, task: GuardedTask) -> list[int]:
         """Inner periods by which a command may be later; the mean over a cycle of a dither is half a cycle old."""

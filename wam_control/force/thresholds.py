@@ -95,19 +95,12 @@ class GuardThresholds:
     # rad of the node's own frequency per sample: a faster loop without delay is examined as a continuous one
     continuous: float = 0.1
     cycle_excess: float = 1.5  # largest cycle that counts as the stiction cycle, in sizes of (5.8)
-    parts: int = 2  # steps in an inner period
-    rest_fraction: float = 0.2  # of the saturation: peak to peak at the end of a response that counts as rest
-    rises: float = 1.5  # duration of a trial, in times that the largest step takes at the saturated speed
-    oscillations: float = 60.0  # of the node, added to that duration
-    # saturations, in F_static
-    trial_candidates: tuple[float, ...] = (60.0, 30.0, 15.0, 8.0, 5.0, 3.5, 2.5, 1.7, 1.2, 0.8, 0.5)
     # while the arm moves
     turn: float = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
     shift: float = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again
     growth: float = 1.5  # of the commanded force, after which it is assessed again
     # of the required scale, all of which have to be stable
     scales: tuple[float, ...] = (0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
-    positions: tuple[float, ...] = (0.25, 0.5, 0.75, 1.0)  # of a cover's length, at which an uncertain contact may be
 
 
 FORCE = ForceThresholds()
