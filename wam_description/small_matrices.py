@@ -29,6 +29,12 @@ def inverse(matrix: Array) -> Array:
     return found
 
 
+def largest_eigenvalue(matrix: Array) -> float:
+    """Of a symmetric matrix (n, n); NaN where it is not finite."""
+    found: float = LAPACK.eigvalsh_lo(matrix).item(-1)
+    return found
+
+
 def solution(matrix: Array, right: Array) -> Array:
     """The vector (n,) of which a matrix (n, n) makes a right side (n,).
 

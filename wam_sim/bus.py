@@ -92,7 +92,7 @@ def of_node(node: str, topic: str) -> str:
     return f"{node}: {topic}" if topic in EVERY_NODE else topic
 
 
-_Row = tuple[Any, ...]  # stamp and numbers of a message
+_Row = list[Any]  # stamp and numbers of a message
 
 
 class _Kept:
@@ -107,7 +107,7 @@ class _Kept:
     is_framed : whether messages have a frame.
     """
 
-    __slots__ = ("_blocks", "_count", "_extend", "_frame", "_is_framed", "_pack", "_row")
+    __slots__ = ("_block", "_blocks", "_count", "_frame", "_is_framed", "_pack", "_row")
 
     def __init__(self, row: Callable[[int, Any], _Row], is_framed: bool) -> None:
         self._row, self._is_framed = row, is_framed
@@ -119,14 +119,14 @@ class _Kept:
         row = self._row(stamp, value)
         if len(row) != self._count or (self._is_framed and value.frame != self._frame):
             self._begin(len(row), value.frame if self._is_framed else "")
-        self._extend(self._pack(*row))
+        self._block += self._pack(*row)
 
     def _begin(self, count: int, frame: str) -> None:
         """Begin a block of messages of another length or frame."""
         self._count, self._frame = count, frame
-        layout, block = Struct(f"q{count - 1}d"), bytearray()
-        self._blocks.append((frame, layout, block))
-        self._pack, self._extend = layout.pack, block.extend
+        layout, self._block = Struct(f"q{count - 1}d"), bytearray()
+        self._blocks.append((frame, layout, self._block))
+        self._pack = layout.pack
 
     def taken(self) -> list[TopicValue]:
         """The messages since the last call."""
@@ -201,7 +201,8 @@ def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets:
         done: list[tuple[int, Outputs]] = []
         try:
             for inlet, work in reactions:
-                done += [(inputs.stamp, work(inputs)) for inputs in inlet(stamp, value)]
+                for inputs in inlet(stamp, value):
+                    done.append((inputs.stamp, work(inputs)))  # noqa: PERF401 - most complete no step
         except OutOfTime:  # the reactions before have worked all the same
             pass
         for at, outputs in done:
@@ -212,14 +213,14 @@ def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets:
 
 
 _ROWS: dict[str, Callable[[int, Any], _Row]] = {
-    JOINT_STATE: lambda stamp, value: (stamp, *value[0], *value[1], *value[2]),
-    WRENCH: lambda stamp, value: (stamp, *value.force, *value.torque),
-    POINT: lambda stamp, value: (stamp, *value.position),
-    TABLE: lambda stamp, value: (stamp, *chain.from_iterable(value.rows)),
+    JOINT_STATE: lambda stamp, value: [stamp, *value[0], *value[1], *value[2]],
+    WRENCH: lambda stamp, value: [stamp, *value.force, *value.torque],
+    POINT: lambda stamp, value: [stamp, *value.position],
+    TABLE: lambda stamp, value: [stamp, *chain.from_iterable(value.rows)],
 }
 _FRAMED = {WRENCH, POINT, TABLE}
 
 
 def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
     """A value of a topic of numbers as one row."""
-    return TopicValue(stamp, _ROWS[topic.type](stamp, value)[1:], value.frame if topic.type in _FRAMED else "")
+    return TopicValue(stamp, tuple(_ROWS[topic.type](stamp, value)[1:]), value.frame if topic.type in _FRAMED else "")

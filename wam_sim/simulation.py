@@ -79,7 +79,7 @@ class Simulation:
         self._publish = self._bus.publish
         self._publish_states = self._bus.publisher("motor_states")
         self._currents: tuple[int, list[float]] = (0, [])
-        self._reported: tuple[Mode, str] | None = None
+        self._reported: tuple[Mode, tuple[Event, ...]] | None = None
         self._steps = steps
         self._begins: list[int] = []  # of the steps, ns
         self._events: list[tuple[int, tuple[Event, ...]]] = []  # of the force loop, each time these change
@@ -194,7 +194,7 @@ class Simulation:
             self._require_progress(stamp)
         driver.command(*self._currents)
         driver.advance(0.0)
-        if (driver.safety.mode, driver.safety.fault) != self._reported:
+        if (driver.safety.mode, driver.safety.events) != self._reported:
             self._report()
         return False
 
@@ -259,7 +259,7 @@ class Simulation:
 
     def _report(self) -> None:
         """Report a new mode or fault of the driver to every node that takes status."""
-        self._reported = self.driver.safety.mode, self.driver.safety.fault
+        self._reported = self.driver.safety.mode, self.driver.safety.events
         status = self.driver_status
         for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):

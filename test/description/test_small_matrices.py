@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wam_description.small_matrices import inverse, solution, solutions
+from wam_description.small_matrices import inverse, largest_eigenvalue, solution, solutions
 
 
 @pytest.mark.parametrize("n", [1, 3, 4, 7])
@@ -13,6 +13,7 @@ def test_inverse_and_solution_have_the_bits_of_numpy(n: int) -> None:
         root, right = random.normal(size=(n, n)), random.normal(size=n)
         matrix = root @ root.T * 10.0 ** random.uniform(-6.0, 3.0)
         assert inverse(matrix).tobytes() == np.linalg.inv(matrix).tobytes()
+        assert largest_eigenvalue(matrix) == np.linalg.eigvalsh(matrix)[-1]
         assert solution(matrix, right).tobytes() == np.linalg.solve(matrix, right).tobytes()
         matrices, sides = np.stack([matrix, root]), random.normal(size=(2, n))
         assert solutions(matrices, sides).tobytes() == np.linalg.solve(matrices, sides[:, :, None]).tobytes()

@@ -54,9 +54,9 @@ class LinkEffects:
             self._per_error[10 * i + 1 : 10 * i + 4, 3 * i : 3 * i + 3] = -mass * np.eye(3)
         self._per_error[10 * n - 10 :, -1] = -np.array([1.0, *tool, *inertia[INERTIA]])
 
-    def of(self, motion: FilteredMotion) -> Array:
+    def of(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
         """Torques, (n, 3 n + 1), per m of the centres' coordinates in the frames of their links, and per kg."""
-        return self._body.inverse_dynamics_regressor(*motion[2:5]).dot(self._per_error)
+        return self._body.inverse_dynamics_regressor(pose, velocity, acceleration).dot(self._per_error)
 
 
 class GaugeEffects:
@@ -69,8 +69,10 @@ class GaugeEffects:
 
     def observation(self, motion: FilteredMotion, *_: object) -> Observation:
         """See `ErrorEffects.observation`."""
-        still = motion._replace(velocity=self._still, acceleration=self._still)
-        effects = np.hstack((np.diag(motion.model), self._links.of(still)))
+        n = len(motion.model)
+        effects = np.zeros((n, 4 * n + 1))
+        effects.ravel()[: n * len(effects[0]) : len(effects[0]) + 1] = motion.model  # the diagonal
+        effects[:, n:] = self._links.of(motion.pose, self._still, self._still)
         residual = motion.residual - self._payload * effects[:, -1]
         return Observation(residual, effects, self._rest, self._still, motion.pose, self._lasting)
 
@@ -147,7 +149,7 @@ class ErrorEffects:
         effects[:, 7 * n : 8 * n] = self._to_joints.dot(own)
         effects[:, 8 * n : 10 * n] = -self._through * (self._dynamic * slope)
         effects[:, 10 * n] = self._to_joints.dot(signals[-n:])
-        effects[:, 10 * n + 1 :] = self._links.of(motion)
+        effects[:, 10 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
         residual = residual - given.payload[0] * effects[:, -1]
         at_rest, shape = self._sds
         variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved

@@ -6,7 +6,6 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 import math
 from collections.abc import Sequence
 from operator import add, sub
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import ErrorEffects, FilteredMotion, GaugeEffects, LinkEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
-from wam_control.contact.motor_side import JointSample, MotorSide
+from wam_control.contact.motor_side import MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
@@ -82,7 +81,7 @@ class MomentumObserver:
         self._body = RigidBody(arm, parameters.mass_scale)
         cycle = 0 if use_joint_sensors else dither_cycle
         self._side = side = MotorSide(arm, parameters, cycle > 0, model)
-        self._is_link_side = use_joint_sensors
+        self._is_link_side, self._no_signals = use_joint_sensors, np.zeros(0)
         fast, times = parameters.detection_time, [parameters.time_constant]
         if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not cycle:
             times.append(fast)
@@ -150,17 +149,21 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(JointSample(position, velocity, effort, [], np.zeros(0), dt))
+            return self._update(position, velocity, effort, [], self._no_signals, dt)
         if self._side.carries_nothing(state):
             self.reset()
             return True
         sample = self._side.take(state, dt + self._gap)
         self._gap = 0.0
-        return sample is None or self._update(sample)
+        if sample is None:
+            return True
+        q, qd, tau, friction, signals, span = sample
+        return self._update(q, qd, tau, friction, signals, span)
 
-    def _update(self, sample: JointSample) -> bool:
-        """Take a sample of the joints."""
-        q, qd, tau, friction, signals, dt = sample
+    def _update(
+        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, dt: float
+    ) -> bool:
+        """Take a sample of the joints, see `JointSample`."""
         body, at, speed, last = self._body, np.array(q), np.array(qd), self._last
         inertia = body.mass_matrix(at) if self._is_link_side else body.mass_matrix(at) + self._side.inertia
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
@@ -193,7 +196,8 @@ class MomentumObserver:
 
         See `ModelErrors`; from joint sensors its errors are those of masses, centres of mass and payload.
         """
-        self._side.expect()
+        if not self._is_link_side:
+            self._side.expect()
         self.seen = self._observation()
         torques, covariance = self._errors.corrected(self.seen)
         return torques.tolist(), self._errors.size * covariance
@@ -264,7 +268,7 @@ class MomentumObserver:
         return ""
 
 
-class _Sample(NamedTuple):
+class _Sample:
     """The last sample that was taken.
 
     Attributes
@@ -276,12 +280,16 @@ class _Sample(NamedTuple):
     bias : the same without friction.
     """
 
-    q: list[float]
-    qd: list[float]
-    momentum: list[float]
-    inertia: Array
-    known: list[float]
-    bias: list[float]
+    def __init__(
+        self,
+        q: list[float],
+        qd: list[float],
+        momentum: list[float],
+        inertia: Array,
+        known: list[float],
+        bias: list[float],
+    ) -> None:
+        self.q, self.qd, self.momentum, self.inertia, self.known, self.bias = q, qd, momentum, inertia, known, bias
 
 
 class _Filters:

@@ -6,6 +6,7 @@ after the touch alone; `force_feedforward` feeds it forward from the command on.
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,12 @@ class FeedForward:
     """
 
     def __init__(self, arm: Arm) -> None:
-        self._arm, self._map = arm, TransmissionMap.of(arm)
+        self._arm = arm
         self._countered = LowPass()
+
+    @cached_property
+    def _map(self) -> TransmissionMap:
+        return TransmissionMap.of(self._arm)
 
     def step(self, force: Array, velocity: Sequence[float], parameters: ForceLoopParameters, dt: float) -> list[float]:
         """Torque of the joints in one outer period (n,), N m: of the forces and, with joint sensors, of friction.

@@ -126,7 +126,8 @@ class ForceLoopNode:
         """How well the force is known, at the display rate and where the event has changed."""
         event, before = self._loop.event, self._event
         self._event = event
-        if event.subject == before.subject and not self._timing.is_display(stamp):
+        is_same = event is before or event.subject == before.subject
+        if is_same and not self._timing.is_display(stamp):
             return {}
         if out.rows:
             return {"force_axis": Table(BASE, ()), "task_axes": Table(out.frame, out.rows)}

@@ -104,8 +104,8 @@ class ForceMeasurement:
         """
         torque = self._torque(own, sensors, estimated)
         self._q, self._torque_sd = joints.position, self._none + sensing_of(own).torque_sd
-        speed = np.abs(self._filters["speed"].step(np.array(joints.velocity), FORCE.steady_time, dt)).max()
-        self.speed = float(speed)
+        speeds = self._filters["speed"].step(np.array(joints.velocity), FORCE.steady_time, dt)
+        self.speed = max(map(abs, speeds.tolist()))
         self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
         self._filters["steady"].step(torque, FORCE.steady_time, dt)
         self._external = torque - self._zeros

@@ -68,7 +68,8 @@ def solve(
     else:
         unlimited = posture
     broken = [row for row in least if row.size > FORCE.shortest_lever]
-    is_inside = bool((unlimited >= low).all() and (unlimited <= high).all())
+    each = zip(low.tolist(), unlimited.tolist(), high.tolist())  # noqa: B905 - as long as each other
+    is_inside = all([slowest <= speed <= fastest for slowest, speed, fastest in each])  # noqa: C419 - a list takes half the time
     if is_inside and all(along.dot(unlimited) >= speed for along, speed in broken):
         return Solution(unlimited, unlimited)
     return Solution(_limited(rows, posture, broken, low, high), unlimited)
