@@ -19,8 +19,8 @@ from wam_ros.process_signals import SIGNALS, end_at_once_on_signals, ignore_sign
 COMMANDS = {
     "demo": "play the demonstration or a task, record it, print its report",
     "up": "start the nodes and run them until Ctrl-C",
-    "node": "start one node, with ROS arguments if needed",
-    "call": "make a request to a running stack: enable, set, echo, push",
+    "node": "start nodes in one process, with ROS arguments if needed",
+    "call": "make a request to a running stack, such as enable or set",
     "live": "show a running stack or a recording in the browser",
     "bag": "record a running stack, list a bag or repair it",
     "analyse": "analyse a recording and compare it with theory",

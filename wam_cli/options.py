@@ -240,8 +240,8 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="each, also without a value: one process per node; grouped: one for driver and velocity loop, one for the "
-        "recorder, one for all others; default: one process for all, in realtime grouped",
+        help="each (also without a value): one process for each node. grouped: three processes, one for driver and "
+        "velocity loop, one for the recorder, one for all others. Default: one process; in realtime: grouped",
     )
     parser.add_argument(
         "--realtime",

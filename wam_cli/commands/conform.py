@@ -38,7 +38,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=COUNT,
         default=0,
         metavar="VERSION",
-        help="firmware of a simulated arm, which runs in its own process on the bus of --bus, e.g. "
+        help="start a simulated arm with this firmware, e.g. 200, in a process of its own on the bus of --bus, e.g. "
         "udp_multicast:239.74.163.2",
     )
     parser.add_argument(
@@ -50,7 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--running",
         action="store_true",
-        help="test a driver that already runs, with nodes [driver, velocity_loop] and timing.mode realtime",
+        help="test a driver that already runs, started with timing.mode=realtime and nodes=[driver,velocity_loop]",
     )
     parser.add_argument(
         "--current",

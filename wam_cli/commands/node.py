@@ -12,8 +12,9 @@ TAKES_ROS_ARGUMENTS = True
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command; the rest of the line is ROS's."""
-    parser.add_argument("name", nargs="+", help="driver, transform, velocity_loop, gravity, force_loop, ...")
-    parser.usage = "wam node [--config CONFIG] NAME... [ROS ARGUMENT...]"
+    known = "driver, transform, velocity_loop, gravity, force_loop, ...; several share one process"
+    parser.add_argument("name", nargs="+", help=known)
+    parser.usage = "wam node [OPTION...] NAME... [ROS ARGUMENT...]"
     parser.epilog = "ROS arguments are for example: -p timing.mode:=lockstep -r __ns:=/left"
     take_configuration(parser)
 

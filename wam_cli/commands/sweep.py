@@ -68,7 +68,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(
-        "--list", action="store_true", help="no grid of all combinations: run k takes the k-th value of each --vary"
+        "--list", action="store_true", help="run k takes the k-th value of each --vary; default: all combinations"
     )
     kind.add_argument(
         "--random",
