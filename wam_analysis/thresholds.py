@@ -49,6 +49,7 @@ class ShaftThresholds:
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1
+    limited: float = 0.1  # of the time, in which an effort is exactly at its bounds
     agree: float = 0.2  # by which a recorded velocity may differ from the rate of the position
     way: float = 1.0  # s, in which they are compared: longer than a velocity is late, shorter than an encoder slips
     least_work: float = 1e-3  # J below which no efficiency is given
@@ -231,6 +232,8 @@ class StreamThresholds:
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
+    evenly: float = 0.9  # of the changes of a signal: so many are as far apart, if it is held over between them
+    counts: float = 2.0  # smallest changes: those of an encoder are mostly smaller
     turns: tuple[float, ...] = (
         2.0 * math.pi,
         4.0 * math.pi,

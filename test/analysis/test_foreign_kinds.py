@@ -101,16 +101,16 @@ def without(sent: list[Sent], lacks: Callable[[int], bool], *fields: str) -> lis
 
 def sparse() -> list[Case]:
     made = [
-        ("every other", by_rosbags, 100.0, lambda i: i % 2, ("velocity", "effort"), 50),
-        ("three of four", sqlite, 200.0, lambda i: i % 4, ("velocity", "effort"), 25),
-        ("effort alone", ros1, 125.0, lambda i: i % 3 == 1, ("effort",), 67),
-        ("velocity alone", by_mcap_ros2, 80.0, lambda i: i % 5 == 0, ("velocity",), 80),
+        ("every other", by_rosbags, 100.0, lambda i: i % 2, ("velocity", "effort"), 1500),
+        ("three of four", sqlite, 200.0, lambda i: i % 4, ("velocity", "effort"), 1500),
+        ("effort alone", ros1, 125.0, lambda i: i % 3 == 1, ("effort",), 2500),
+        ("velocity alone", by_mcap_ros2, 80.0, lambda i: i % 5 == 0, ("velocity",), 1920),
     ]
     return [
         Case(name, write, without(one("/joint_states", rate, 0.7, 0.5), lacks, *fields),
              sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate, "/joint_states: missed periods": 0.0},
-             f"in only {share} % of the messages")
-        for name, write, rate, lacks, fields, share in made
+             f"in only {kept} of {30.0 * rate:g} messages")
+        for name, write, rate, lacks, fields, kept in made
     ]  # fmt: skip
 
 
@@ -276,6 +276,30 @@ def unfilled() -> list[Case]:
     ]
 
 
+def held_over() -> list[Case]:
+    def repeated(times: int, *quantities: str) -> list[Sent]:
+        sent = one("/joint_states", 400.0, 0.7, 0.5)
+        return [s._replace(fields=s.fields | {q: sent[i - i % times].fields[q] for q in quantities})
+                for i, s in enumerate(sent)]  # fmt: skip
+
+    every = ("position", "velocity", "effort")
+    return [
+        Case("all", by_rosbags, repeated(4, *every), sine(0.7, 0.5) | FRICTION, "only repeated in 9000 of 12000"),
+        Case("effort", ros1, repeated(2, "effort"), sine(0.7, 0.5) | FRICTION, "effort only repeated in 6000"),
+    ]
+
+
+def wrong_efforts() -> list[Case]:
+    def changed(change: Any) -> list[Sent]:
+        sent = one("/joint_states", 100.0, 0.7, 0.5)
+        return [s._replace(fields=s.fields | {"effort": change(s.fields["effort"])}) for s in sent]
+
+    return [
+        Case("sign", sqlite, changed(lambda e: -e), sine(0.7, 0.5), "as if the effort had the other sign"),
+        Case("limited", by_rosbags, changed(lambda e: np.clip(e, -1.6, 1.6)), sine(0.7, 0.5), "as if it was limited"),
+    ]
+
+
 def other_units() -> list[Case]:
     def scaled(quantity: str, by: float, write: Any, told: str) -> Case:
         sent = one("/joint_states", 100.0, 0.7, 0.5)
@@ -294,8 +318,8 @@ def other_units() -> list[Case]:
 
 
 KINDS = (
-    unfilled, other_units, wraps, sparse, coarse, twice, names, called_as_commands, few_cycles, still, zeros,
-    contradictions, formats,
+    unfilled, held_over, wrong_efforts, other_units, wraps, sparse, coarse, twice, names, called_as_commands,
+    few_cycles, still, zeros, contradictions, formats,
 )  # fmt: skip
 CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
 
@@ -345,6 +369,7 @@ class Written(NamedTuple):
     fields: tuple[str, ...] = ()
     times: Callable[[float], Any] = float
     comment: str = ""
+    below: str = ""
 
 
 def date(time: float) -> str:
@@ -364,6 +389,8 @@ TABLES = {
     "tabs": Written(delimiter="\t"),
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "dates": Written(times=date),
+    "dates of a zone": Written(times=lambda time: f"{date(time)}+02:00"),
+    "a row of units": Written(units=OTHER_UNITS, below="ms,deg,deg/s,mA\n"),
     "some rows without a time": Written(times=lambda time: "" if round(100.0 * time) % 1000 == 7 else time),
     "a comment above": Written(comment="# recorded by hand\n"),
     "titles as numpy writes them": Written(("# time", " position.a", " velocity.a", " effort.a")),
@@ -381,13 +408,14 @@ def table_of(how: Written) -> tuple[list[str], list[list[Any]]]:
 @pytest.mark.parametrize("is_file", [True, False])
 def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: Path) -> None:
     titles, columns = table_of(how)
-    source: Any = dict(zip(titles, columns, strict=True))
+    source: Any = dict(zip(WITH_UNITS if how.below else titles, columns, strict=True))  # a file alone has such a row
     if is_file:
         source = tmp_path / "table.csv"
         with source.open("w", newline="") as stream:
             stream.write(how.comment)
             writer = csv.writer(stream, delimiter=how.delimiter)
             writer.writerow(titles)
+            stream.write(how.below)
             writer.writerows([str(one).replace(".", how.decimal) for one in row] for row in zip(*columns, strict=True))
     analysis = analyse(source, lambda doing: None, topic_map([], [], [], how.fields, []))
     numbers = {one.name: one.measured for section in analysis.sections for one in section.findings}
@@ -417,6 +445,12 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     [
         ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
         ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
+        ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
+        (
+            "time,position.a\n" + "".join(f"{i % 200},1\n" for i in range(400)),
+            NOTHING,
+            "after 200 rows the time goes back",
+        ),
         ("time,position.a\n0,1\n", topic_map([], [], ["/a"], [], []), "titles command.position.JOINT"),
         ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
     ],

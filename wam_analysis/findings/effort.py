@@ -18,6 +18,7 @@ RECORD = (
     "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
     "and fast, for some ten seconds, while nothing touches the arm."
 )
+BELOW_ZERO = "its dry friction comes out as {}, as if the effort had the other sign, or something else moved the joint."
 WEIGHT, DRAG = "weight", "drag"
 ALSO = {
     WEIGHT: "the fit includes the joint's weight",
@@ -31,13 +32,16 @@ def effort_section(recording: AnalysedRecording) -> Section:
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
     for one in states:
         unlike = contradiction(one)
+        wrong += _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
         whole = friction(one) if one.is_joint and not unlike else None
-        if whole is None:
-            if not unlike and {"effort"} < one.values.keys() and not rests(one):
+        found = None if whole is None else whole.friction
+        if whole is None or found is None or not whole.is_known:
+            if found is not None and found.dynamic.is_negative:
+                wrong.append(f"{one.label}: {BELOW_ZERO.format(shown(found.dynamic.value, one.units['effort']))}")
+            elif not unlike and {"effort"} < one.values.keys() and not rests(one):
                 doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
             continue
-        found = whole.friction
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s").partition("/")[0]
         every = (
             ("dry friction", effort, found.dynamic),
@@ -76,6 +80,20 @@ def effort_section(recording: AnalysedRecording) -> Section:
             "friction from a delay of the effort."
         )
     return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, (), brief, wrong)
+
+
+def _limited(source: Source) -> list[str]:
+    """That an effort stays at its bounds for long, which no friction with its noise does."""
+    effort = source.only("effort").values.get("effort", np.zeros(0))
+    bounds = (float(np.min(effort, initial=math.inf)), float(np.max(effort, initial=-math.inf)))
+    share = float(np.mean(np.isin(effort, bounds))) if bounds[0] < bounds[1] else 0.0
+    if share < SHAFT.limited:
+        return []
+    low, high = (shown(bound, source.units["effort"]) for bound in bounds)
+    when = f"in {100.0 * share:.0f} % of the messages"
+    return [
+        f"{source.label}: its effort is exactly {low} or {high} {when}, as if it was limited: its friction is wrong."
+    ]
 
 
 def contradiction(source: Source) -> str:
@@ -161,9 +179,15 @@ class FoundFriction(NamedTuple):
     lag: float
     per_lag: float
 
+    @property
+    def is_known(self) -> bool:
+        """Whether a friction is identified, and nothing comes out below zero, as where the effort holds more."""
+        dynamic, viscous, inertia = self.friction.dynamic, self.friction.viscous, self.friction.inertia
+        return (dynamic.is_sure or viscous.is_sure) and not any(one.is_negative for one in (dynamic, viscous, inertia))
+
 
 def friction(source: Source) -> FoundFriction | None:
-    """Friction and inertia of a joint that its weight may load; None without effort, velocity or an answer.
+    """Friction and inertia of a joint that its weight may load; None without effort or velocity.
 
     The recorded velocity must be the rate of the position, see `contradiction`.
 
@@ -206,11 +230,7 @@ def friction(source: Source) -> FoundFriction | None:
     inertia = _less_certain(found.inertia, [acceleration.share_of_noise() * found.inertia.value])
     if one_frequency:
         per_lag, inertia = (found.viscous.value - trial.fit(also, 1).viscous.value) / period, UNKNOWN
-    found = found._replace(inertia=inertia)
-    is_known = found.dynamic.is_sure or found.viscous.is_sure
-    if not is_known or any(one.is_negative for one in (found.dynamic, found.viscous, inertia)):
-        return None
-    return FoundFriction(found, also, shift * period, per_lag)
+    return FoundFriction(found._replace(inertia=inertia), also, shift * period, per_lag)
 
 
 class _Trial(NamedTuple):

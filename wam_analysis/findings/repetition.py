@@ -66,11 +66,11 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
     size = f"{shown(cycle.peak_to_peak, unit)} peak to peak"
     if not CYCLE.changing < cycle.growth < 1.0 / CYCLE.changing:
         change = f"{'growing' if cycle.growth > 1.0 else 'shrinking'} by {100.0 * abs(cycle.growth - 1.0):.0f} %"
-        size += f", {change} from half to half,"
+        size += f", {change} from half to half"
     where = f"from {begin:.1f} to {end:.1f} s (confidence {cycle.confidence:.2f})"
     frequency = shown(1.0 / cycle.period, "Hz")
     if found.origin == LIMIT_CYCLE:
-        return f"{label}: limit cycle of {size} at {frequency} {where}; it was not commanded."
+        return f"{label}: limit cycle of {size}, at {frequency} {where}; it was not commanded."
     ends = {
         COMMANDED_CYCLE: ", as it was commanded",
         HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion, "

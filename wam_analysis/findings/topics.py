@@ -92,8 +92,9 @@ DONE_TO = {
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
     Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
     Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}; this is removed",
+    Treatment.HELD: "{quantity} only repeated in {number} of {of} messages; the others are used",
     Treatment.UNFILLED: "the {quantity} is 0 in every message although the position moves; the rate of that is used",
-    Treatment.SPARSE: "{quantity} in only {share:.0f} % of the messages",
+    Treatment.SPARSE: "{quantity} in only {share} of {of} messages",
 }
 
 
@@ -115,7 +116,7 @@ def _treated(found: Sequence[Source]) -> list[str]:
             of=treated.of,
             size=shown(abs(treated.size), those[0].units.get(quantities[0], "s")),
             times=times(treated.number),
-            share=100.0 * (1.0 - treated.number / treated.of),
+            share=treated.of - treated.number,
         )
         sentences.append(f"{subject}: {words}.")
     return sentences

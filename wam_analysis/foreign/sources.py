@@ -29,6 +29,7 @@ class Treatment(StrEnum):
     TWICE = "messages that came twice"  # the second was left out
     WRAPPED = "wraps of the angle"  # were unwrapped
     MOVED_ZERO = "jumps of the zero"  # were taken off
+    HELD = "values held over"  # from the message before: were left out
     UNFILLED = "zeros"  # although the joint moves: were left out
     SPARSE = "messages without"  # the others were used
 
@@ -196,13 +197,16 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
         return _Timed(rows, stamps / 1e9, ())
     numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
     twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
-    if is_seldom or 2 * np.sum(twice) >= number:
+    if is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]:
         kept = np.concatenate([[True], ~same])
         return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(Treatment.TWICE, "", number, of),))
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
-    ends = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])
-    return _Timed(rows, ends / 1e9, (Treated(Treatment.SPREAD, "", number, of),))
+    placed = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])
+    even = np.linspace(stamps[0], stamps[-1] + period, of, endpoint=False)
+    if np.max(np.abs(even - placed)) <= period:
+        placed = even  # the rate was constant
+    return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", number, of),))
 
 
 def clocks_of(bag: Bag) -> dict[str, Clock]:
@@ -298,7 +302,10 @@ def _treated(one: Source) -> Source:
         del values["velocity"]
         treated.append(Treated(Treatment.UNFILLED, "velocity", len(one.time), len(one.time)))
     for quantity, value in values.items():
-        if lacking := int(np.sum(~np.isfinite(value))):
+        if not one.is_command and (number := int(np.sum(held := _held_over(value)))):
+            values[quantity] = np.where(held, math.nan, value)
+            treated.append(Treated(Treatment.HELD, quantity, number, len(value)))
+        elif lacking := int(np.sum(~np.isfinite(value))):
             treated.append(Treated(Treatment.SPARSE, quantity, lacking, len(value)))
     if "position" in values and one.units["position"] == "rad":
         known = np.isfinite(values["position"])
@@ -315,6 +322,25 @@ def _treated(one: Source) -> Source:
             values["position"] = values["position"] - whole
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
     return one._replace(values=values, treated=tuple(treated))
+
+
+def _held_over(value: Numbers) -> Mask:
+    """Which samples only repeat the one before, where a signal changes in every second message at most, and evenly.
+
+    One that rests, or moves by counts of an encoder, repeats samples, too, but changes by one count.
+    """
+    steps = np.abs(np.diff(value))
+    changed = np.flatnonzero(steps > 0.0) + 1
+    apart, sizes = np.diff(changed), steps[changed - 1]
+    if len(apart) < SHAFT.fewest_samples or np.any(np.isnan(steps)):
+        return np.zeros(len(value), np.bool_)
+    often = float(np.median(apart))
+    is_even = np.mean((apart > 1) & (np.abs(apart - often) <= 1.0)) >= STREAM.evenly
+    if not is_even or float(np.median(sizes)) < STREAM.counts * float(np.min(sizes)):
+        return np.zeros(len(value), np.bool_)
+    row = np.arange(len(value))
+    since = row - np.concatenate([[0], changed])[np.searchsorted(changed, row, side="right")]
+    return since % math.ceil(np.quantile(apart, STREAM.evenly)) > 0
 
 
 def _unwrapped(time: Numbers, position: Numbers) -> tuple[Numbers, int, float]:

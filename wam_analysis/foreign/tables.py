@@ -1,6 +1,7 @@
 """Tables as recordings: CSV files and maps of columns, with the times and units that they have."""
 
 import csv
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
@@ -12,11 +13,13 @@ import numpy as np
 from wam_analysis.foreign.clocks import nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, TopicMap, unit_of
+from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
 from wam_bag.columns import JOINT_FIELDS, joint_names
 
 TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](.*)[\])]\s*)?")  # and the unit behind it
+ZONE = re.compile(r"(Z|[+-]\d\d:\d\d)$")  # of a time of day, behind it
 DELIMITERS = ",;\t"
 COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
@@ -36,7 +39,8 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             lines = [line for line in stream if line.strip()]
     except (OSError, UnicodeDecodeError) as error:
-        raise BagError(f"{path} cannot be read: {getattr(error, 'strerror', '') or error}") from error
+        reason = getattr(error, "strerror", "") or f"{error}; save it as text in UTF-8"
+        raise BagError(f"{path} cannot be read: {reason}") from error
     while len(lines) > 1 and lines[0].startswith("#") and not lines[1].lstrip(' "+-.')[:1].isdigit():
         del lines[0]  # a comment above the titles, which may begin with '#', too
     head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
@@ -46,6 +50,11 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
         )
+    if any(map(str.strip, rows[0])) and not any(map(_is_value, rows[0])):
+        units, *rows = rows  # below the titles
+        head = [
+            f"{title} [{unit.strip()}]" if unit.strip() else title for title, unit in zip(head, units, strict=False)
+        ]
     _require_once(path, head)
     return dict(zip(head, zip_longest(*rows, fillvalue=""), strict=False))
 
@@ -87,6 +96,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
         raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
+    _require_one_run(path, times)
     topics: dict[str, Any] = {}
     for is_command, suffix in ((False, ""), (True, "_command")):
         parts = {q: {one.name: one for one in columns if one.is_command is is_command} for q, columns in found.items()}
@@ -117,6 +127,21 @@ def _topics(
         yield "joints", JointColumns(times, times, nothing, names, p, v, e)
     if parts["force"] or parts["torque"]:
         yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz", 0.0) for q in ("force", "torque")))
+
+
+def _require_one_run(path: Path, times: Times) -> None:
+    """Refuse a table whose time is constant or begins again; rows that are only in another order are put in order."""
+    if len(times) > 1 and not np.ptp(times):
+        raise BagError(
+            f"{path}: the time is the same in all {len(times)} rows; name its column with --map stamp=COLUMN"
+        )
+    again = np.flatnonzero(np.diff(times) < -STREAM.reset)
+    if 0 < len(again) <= STREAM.repeated * len(times):
+        back = (times[again[0]] - times[again[0] + 1]) / 1e9
+        raise BagError(
+            f"{path}: after {again[0] + 1} rows the time goes back by {back:.4g} s, as where a second recording "
+            "begins; give each by itself"
+        )
 
 
 def _require_once(path: Path, titles: Sequence[str]) -> None:
@@ -194,6 +219,11 @@ def _number(text: str) -> float:
         return np.nan
 
 
+def _is_value(cell: str) -> bool:
+    """Whether a cell is a number, a date or nan, and no unit."""
+    return not math.isnan(_number(cell)) or cell.strip().lower() == "nan" or any(map(str.isdigit, cell))
+
+
 def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     """Times of the rows that have one, ns, and which these are: of numbers, or of dates."""
     dates = np.asarray(column)
@@ -205,6 +235,6 @@ def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     if np.any(known):
         return nanoseconds(label, numbers[known], given), known
     try:
-        return _times(label, np.array([str(one).removesuffix("Z") for one in column], "M8[ns]"), given)
+        return _times(label, np.array([ZONE.sub("", str(one)) for one in column], "M8[ns]"), given)
     except ValueError:
         raise BagError(f"{label} has no times") from None
