@@ -18,7 +18,7 @@
 ``friction_verdict``       domain, stable error and limit cycle of one friction node, chapter 5
 ``guard``                  admits a parameter set, scales its gains while the arm moves, reports
 ``guarded``                what is controlled, as the guard sees it
-``held_arm``               an arm that holds, and an arm that is pushed
+``held_arm``               an arm that is pushed
 ``limits``                 what bounds the motion
 ``loop_design``            the guard's model for a force loop of your own
 ``problem``                joint velocities of one period: least squares with limits

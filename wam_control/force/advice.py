@@ -17,34 +17,6 @@ from wam_description.parts import Joints
 Ways = dict[str, Value]
 
 
-class Advice:
-    """Finds what to change so that a refused force is accepted.
-
-    Attributes
-    ----------
-    ways : what was found, as values of the event; `searched` once all was tried.
-    """
-
-    def __init__(self) -> None:
-        self._search: Iterator[Ways] | None = None
-        self.ways: Ways = {}
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether all was tried."""
-        return "searched" in self.ways
-
-    def step(self, tries: Callable[[], Iterator[Ways]]) -> None:
-        """Try some ways, of those that `tries` has."""
-        self._search = self._search or tries()
-        for _ in range(0 if self.is_complete else FORCE.each):
-            way = next(self._search, None)
-            if way is None:
-                self.ways["searched"] = 1.0
-                return
-            self.ways |= way
-
-
 def tries(
     q: Sequence[float],
     task: TaskCommand,
@@ -54,7 +26,7 @@ def tries(
     believe: Callable[[Sequence[float], CommandedAxis], Belief],
     own: ForceLoopParameters,
 ) -> Iterator[Ways]:
-    """After each force that is tried, the way where it would be obeyed with a reserve, else nothing.
+    """After each force that is tried, the way where it would be obeyed with a reserve, else nothing; then `searched`.
 
     Parameters
     ----------
@@ -87,6 +59,7 @@ def tries(
             break
     if not place.is_pinned:
         yield {"pin": place.position} if is_obeyed(q, pinned, size) else {}
+    yield {"searched": 1.0}
 
 
 def _turned(q: Sequence[float], joints: Joints, margin: float) -> Iterator[tuple[str, float, float, Sequence[float]]]:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.force_axis import ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.limits import is_too_slow, yielding
 from wam_control.force.thresholds import FORCE
 
 Array = NDArray[np.float64]
@@ -87,31 +87,21 @@ def tolerance(desired: float, own: ForceLoopParameters) -> float:
     return max(own.limits.tolerance * abs(desired), own.limits.least_tolerance)
 
 
-def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
-    """How far the stiffest surface and the cables yield to a force, m/N."""
-    return 1.0 / own.guard.contact_stiffness + sensed.compliance
-
-
 def predicted(
-    sensed: ForceAxis,
-    torque_sd: Array,
-    own: ForceLoopParameters,
-    resting: float = 0.0,
-    shaking: float = 0.0,
-    is_too_slow: bool = False,
+    axis: CommandedAxis, torque_sd: Array, own: ForceLoopParameters, resting: float = 0.0, shaking: float = 0.0
 ) -> Errors:
     """Predicted error of a force.
 
     Parameters
     ----------
-    sensed : how the force is measured.
+    axis : of the force.
     torque_sd : of the torques (n,), N m.
     own : parameters of the force loop.
     resting : force, N, that torques at rest look like, and nothing touched gives.
     shaking : swing of the force, N peak to peak, as the arm shakes on the stiffest surface.
-    is_too_slow : whether the arm cannot reach or follow the surface.
     """
-    if sensed.force_sd == math.inf:
+    sensed = axis.sensed
+    if sensed is None or sensed.force_sd == math.inf:
         return Errors(torques=math.inf)
     limits, soft = own.limits, yielding(sensed, own)
     pace = max(own.force_gain) * sensed.speed_fraction
@@ -123,7 +113,7 @@ def predicted(
         place=sensed.place_sd,
         resting=abs(resting),
         moving_surface=(limits.surface_speed / pace if limits.surface_speed else 0.0) + slope,
-        slow_arm=math.inf if is_too_slow or settling > limits.settling_time else 0.0,
+        slow_arm=math.inf if is_too_slow(axis, own) or settling > limits.settling_time else 0.0,
         shaking_arm=limits.tolerance / limits.shake_force * shaking,
     )
 
@@ -136,7 +126,6 @@ def belief(
     is_touching: bool,
     resting: Array,
     shaking: float,
-    is_too_slow: bool,
 ) -> Belief:
     """The belief of one force axis.
 
@@ -148,7 +137,7 @@ def belief(
     own : parameters of the force loop.
     is_touching : whether something is touched: until then, what sensors measure of the arm's own motion is no force.
     resting : torques at rest before (n,), N m, that no touched surface gives.
-    shaking, is_too_slow : as `predicted` has them.
+    shaking : as `predicted` has it.
     """
     sensed, desired = axis.sensed, axis.desired
     force, before = axis.force(torques.now), axis.force(torques.before)
@@ -159,7 +148,7 @@ def belief(
     if torques.acceleration is not None and not is_touching:
         # the acceleration is the mean of a period
         force = before = 0.5 * (force + before) - float(sensed.carried @ torques.acceleration)
-    errors = predicted(sensed, torques.sd, own, float(sensed.sense @ resting), shaking, is_too_slow)
+    errors = predicted(axis, torques.sd, own, float(sensed.sense @ resting), shaking)
     if sensed.force_sd == math.inf:
         return Belief(force, before, math.inf, 0.0, errors, tolerance(size, own))
     sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)

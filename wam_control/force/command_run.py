@@ -2,12 +2,12 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.advice import Advice
+from wam_control.force.advice import Ways
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief, WorldTorques, belief
 from wam_control.force.contact_place import ContactPlace
@@ -16,8 +16,6 @@ from wam_control.force.force_axis import ForceAxes, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
-from wam_control.force.held_arm import HeldArm
-from wam_control.force.limits import is_too_slow
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Covers, Servo, Timing
@@ -35,6 +33,7 @@ class AxisRun:
 
     Attributes
     ----------
+    now, known : the axis in the present period, and what is known of its force.
     place : where its force acts.
     watch, motion : what is reported of its force, or of its motion.
     anchor : position to hold where none is commanded, m or rad.
@@ -44,6 +43,8 @@ class AxisRun:
     """
 
     def __init__(self, of: TaskAxis, covers: Covers) -> None:
+        self.now: CommandedAxis
+        self.known: Belief
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
         self.anchor, self.wound, self.side, self.is_kept = math.nan, math.nan, 1.0, False
@@ -114,43 +115,6 @@ def harmonics(values: Array, turn: float) -> list[Phasors]:
     return [real + 1j * imaginary for real, imaginary in zip(parts[::2], parts[1::2], strict=True)]
 
 
-class Resting:
-    """Torques of the resting arm when a force begins: from a touched surface, or from a model error.
-
-    What a payload explains may always be one.
-
-    Parameters
-    ----------
-    torques : of the world on the joints (n,), N m, that are not taken as zero.
-    """
-
-    def __init__(self, torques: Array) -> None:
-        self.torques, self._is_decided = torques, not torques.any()
-
-    def judge(
-        self,
-        q: Sequence[float],
-        axis: CommandedAxis,
-        measurement: ForceMeasurement,
-        forces: ForceAxes,
-        torque_sd: float,
-    ) -> None:
-        """Decide once for the first axis of the command."""
-        if self._is_decided or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
-            return
-        self._is_decided = True
-        mass, left = measurement.payload(q, self.torques, torque_sd)
-        if mass > 0.0 and left <= FORCE.unexplained:
-            return
-        if axis.sensed is None or axis.place is None:
-            self.torques = np.zeros_like(self.torques)
-            return
-        force = axis.force(self.torques)
-        pressed = axis.place.pressed(axis.direction, abs(force))
-        if force > 0.0 and forces.axis(q, pressed).unexplained(self.torques) <= FORCE.unexplained:
-            self.torques = np.zeros_like(self.torques)
-
-
 class CommandRun:
     """The state of the axes that are commanded.
 
@@ -160,21 +124,23 @@ class CommandRun:
     task : what is commanded; None for a posture alone.
     arm : the arm as the controller knows it.
     timing : of the loops.
-    resting : torques of the world on the joints (n,), N m, of the arm at rest as it begins.
+    resting : torques of the world on the joints (n,), N m, of the arm at rest as it begins, not taken as zero.
     still_sd : standard deviations of the torques of the world (n,), N m, then; later, as the arm last held.
     is_moving : whether the arm moves too fast for these to be known.
 
     Attributes
     ----------
     axes : one of each axis.
-    held : where the arm holds while the command is not obeyed.
+    held_at : joint angles (n,), rad, that the arm holds while the command is not obeyed; None while it is.
+    resting : torques at rest (n,), N m, that are the error of a model, not those of a touched surface.
     approached : way of the posture along the forces to what they touch (n,), rad.
     free_at, before : where the arm last was free, and a period ago (n,), rad; None at first.
     fed : torque of the forces that is fed forward after the touch (n,), N m.
     is_moving : whether the arm still moves as it did when the command began.
     delayed : speeds along the axes that are still to come, m/s or rad/s.
     joints : what is reported of a posture, of each joint.
-    feed_forward, advice : of this command.
+    feed_forward : of this command.
+    search, ways : what would help a refused force: still to be tried, and found.
     fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
     """
 
@@ -190,7 +156,8 @@ class CommandRun:
     ) -> None:
         self.key, self.frame = key, task.frame if task else ""
         self.axes = [AxisRun(axis, arm.covers) for axis in (task.axes if task else ())]
-        self.held, self.shaking, self.resting = HeldArm(), Shaking(timing), Resting(resting)
+        self.held_at: Array | None = None
+        self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()
         self.approached = np.zeros_like(resting)
         self.free_at: Array | None = None
         self.before: Array | None = None
@@ -198,7 +165,9 @@ class CommandRun:
         self.still_sd = still_sd
         self.delayed: deque[list[float]] = deque()
         self.joints = {name: MotionWatch() for name in arm.joints.names}
-        self.feed_forward, self.advice, self.fallback = FeedForward(arm), Advice(), ""
+        self.feed_forward, self.fallback = FeedForward(arm), ""
+        self.search: Iterator[Ways] | None = None
+        self.ways: Ways = {}
 
     def go_on(self, before: "CommandRun") -> None:
         """Keep where the axes touch and hold that were commanded before, too, and the torque that is fed forward."""
@@ -213,19 +182,42 @@ class CommandRun:
         """Whether something is touched by one of its forces."""
         return any(one.watch.touch.is_there for one in self.axes)
 
-    def believe(self, axis: CommandedAxis, size: float, torques: WorldTorques, own: ForceLoopParameters) -> Belief:
-        """What is known of the force along an axis, N; `size` is that of the command."""
-        swing, is_slow = self.shaking.swing(axis, own), is_too_slow(axis, own)
+    def judge(self, q: Sequence[float], measurement: ForceMeasurement, forces: ForceAxes) -> None:
+        """Decide once, for the first axis, whether the torques at rest are those of a touched surface.
+
+        What a payload explains may always be one.
+        """
+        axis = self.axes[0].now if self.axes else None
+        if self._is_decided or axis is None or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
+            return
+        self._is_decided, torques = True, self.resting
+        mass, left = measurement.payload(q, torques, float(measurement.torques.sd.max()))
+        if mass > 0.0 and left <= FORCE.unexplained:
+            return
+        force = axis.force(torques)
+        if axis.sensed is not None and axis.place is not None:
+            pressed = axis.place.pressed(axis.direction, abs(force))
+            if force <= 0.0 or forces.axis(q, pressed).unexplained(torques) > FORCE.unexplained:
+                return
+        self.resting = np.zeros_like(torques)
+
+    def believe(self, axis: CommandedAxis, torques: WorldTorques, own: ForceLoopParameters) -> Belief:
+        """What is known of the force along an axis, N."""
+        size = abs(axis.desired)
+        if axis.is_joint:  # the torques of the joints are one vector
+            size = math.hypot(*(one.now.desired for one in self.axes if one.now.is_joint))
         if own.is_estimated and axis.sensed is not None and not self.is_touching:
             # it will press at rest: on the way there, the friction of the moving motors is less certain
             pressed = sensing_of(own).torque_fraction * axis.desired * axis.sensed.press
             torques = torques._replace(sd=np.hypot(self.still_sd, pressed))
-        return belief(axis, size, torques, own, self.is_touching, self.resting.torques, swing, is_slow)
+        return belief(axis, size, torques, own, self.is_touching, self.resting, self.shaking.swing(axis, own))
 
-    def move(self, moved: Array, axes: Sequence[CommandedAxis], forces: ForceAxes, q: Sequence[float]) -> None:
+    def move(self, moved: Array, forces: ForceAxes, q: Sequence[float]) -> None:
         """Count a motion of the joints (n,), rad: what is touched stays, and the link slides along it."""
-        is_approach = all(axis.is_force for axis in axes)  # another motion may lead to what is to be touched
-        for axis, one in zip(axes, self.axes, strict=True):
+        # another motion may lead to what is to be touched
+        is_approach = all(one.now.is_force for one in self.axes)
+        for one in self.axes:
+            axis = one.now
             if not axis.is_force or axis.place is None or not (is_approach or one.watch.touch.is_there):
                 continue
             one.place.slide(forces.slide(q, axis.place.cover, axis.place.position, moved))

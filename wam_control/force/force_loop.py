@@ -9,15 +9,16 @@ Forces are those of the arm on the world.
 
 import math
 from collections.abc import Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.advice import Advice, tries
+from wam_control.force.advice import tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
-from wam_control.force.command_run import CommandRun
+from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import STEEPEST, ContactPlace, ForcePlace, pinned_position
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, Commands, beyond
@@ -27,14 +28,23 @@ from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
-from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time, winding
+from wam_control.force.limits import (
+    accelerated,
+    approach_speed,
+    calm,
+    followed,
+    joint_bounds,
+    resolution,
+    rise_time,
+    winding,
+)
 from wam_control.force.problem import VelocityRow, solve
 from wam_control.force.stability_guard import GuardAssessment, Guarded
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.event import OBEYED, Code, Event, holding, refused, warning
+from wam_description.event import OBEYED, Code, Event, holding, warning
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
 
@@ -76,7 +86,6 @@ class ForceLoop:
     Attributes
     ----------
     parameters : those in force; with guard.mode `limit` they may be lower than given.
-    refused : number of refused commands.
     refusals : why a present command is refused, by topic; the last good one remains in use.
     events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
     """
@@ -90,7 +99,7 @@ class ForceLoop:
         self._pushed = PushedArm(self._body)
         self._velocity, self._q = np.zeros(len(arm.joints.names)), list[float]()
         self._pressed_at: Array | None = None
-        self.refused, self.refusals = 0, dict[str, Event]()
+        self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self._take(servo, parameters)
         zero = np.zeros(len(self._velocity))
@@ -131,7 +140,7 @@ class ForceLoop:
     @property
     def is_advised(self) -> bool:
         """Whether the event of a refused force has what would help: it is looked for over several periods."""
-        return self._run.advice.is_complete
+        return "searched" in self._run.ways
 
     @property
     def assessment(self) -> GuardAssessment | None:
@@ -220,29 +229,28 @@ class ForceLoop:
         if (has_task and task is None) or (self._run.key == "joints" and torque is None):
             self._admission.restart(q)  # the arm stays where it is
         commands = self._admission.step(own, q, command, posture, torque, dt, task)
-        self.refused += sum(event != self.refusals.get(topic) for topic, event in commands.refusals.items())
         self.refusals = commands.refusals
         done, key = _task(commands, task, own)
         if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
             self._begin(done, key, is_free)
-        axes = self._find_axes(done, contact)
+        self._find_axes(done, contact)
         frame = done.frame if done else BASE
         if own.mode == "open_loop" and task is None:
-            effort = axes[0].along * axes[0].desired if axes else np.zeros(len(q))
+            effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(q)))
             self.events = ()
             return ForceOutput([], effort.tolist(), frame=frame)
         rate = posture_rate if posture_rate and commands.posture == posture else None
-        found, known = self._watch(axes, contact, rate is not None, dt)
+        found = self._watch(contact, rate is not None, dt)
         if task is not None and (reason := beyond(task, own)):
             found.append(holding(Code.REFUSED, "task", reason=reason))
-        velocity, fed, limits = self._move(axes, known, found, contact, commands.posture, rate, is_braked, dt)
+        velocity, fed, limits = self._move(found, contact, commands.posture, rate, is_braked, dt)
         found += limits
-        found += self._watch_motions(axes, found, commands.posture if posture is not None else None, rate, dt)
-        self.events = _by_seriousness(self._advised(found, done, axes))
+        found += self._watch_motions(found, commands.posture if posture is not None else None, rate, dt)
+        self.events = _by_seriousness(self._advised(found, done))
         if self.event.holds:
             self.refusals["task_command" if task else "force_command"] = self.event
         self._velocity = velocity
-        return _output(velocity, fed, axes, known, frame, self._supervision, bool(task), self._run)
+        return self._output(velocity, fed, frame, bool(task))
 
     def _reset(self) -> None:
         """Hold this posture and forget what was before."""
@@ -266,62 +274,59 @@ class ForceLoop:
         before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, still_sd, is_moving)
         self._run.go_on(before)
 
-    def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[CommandedAxis]:
-        """The axes of what is commanded, each at its place."""
+    def _find_axes(self, task: TaskCommand | None, contact: Contact) -> None:
+        """The axes of what is commanded, each at its place, in this period."""
+        run = self._run
         if task is None:
-            return []
-        places = [
-            self._place(task, axis, contact, one.place) for axis, one in zip(task.axes, self._run.axes, strict=True)
-        ]
-        return self._axes.of(self._q, task, places, [one.side for one in self._run.axes])
+            return
+        places = [self._place(task, axis, contact, one.place) for axis, one in zip(task.axes, run.axes, strict=True)]
+        axes = self._axes.of(self._q, task, places, [one.side for one in run.axes])
+        for one, axis in zip(run.axes, axes, strict=True):
+            one.now = axis
 
     def _place(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> ForcePlace:
-        lean, own = 0.0, self.parameters
+        lean = 0.0
         if axis.joint >= 0:
             return ForcePlace("", 0.0, 0.0)
         if contact.cover and axis.position is None:
             turn = np.eye(3) if task.frame == BASE else self._body.cover_pose(self._q, task.frame).rotation
             along = self._body.cover_pose(self._q, contact.cover).rotation[:, 0]
             lean = math.asin(min(abs(float(turn @ np.array(axis.direction) @ along)), 1.0))
-        place = memory.step(axis, contact, lean, own)
+        place = memory.step(axis, contact, lean, self.parameters)
         self._run.fallback = place.rejection
-        if place.rejection and own.is_estimated:
-            self.refusals["contact/hypotheses"] = refused("contact/hypotheses", place.rejection)
         return place
 
-    def _watch(
-        self, axes: Sequence[CommandedAxis], contact: Contact, is_led: bool, dt: float
-    ) -> tuple[list[Event], list[Belief]]:
+    def _watch(self, contact: Contact, is_led: bool, dt: float) -> list[Event]:
         """What is known of each axis, and what its watch reports."""
-        own, run, torques = self.parameters, self._run, self._measurement.torques
+        own, run, forces, torques = self.parameters, self._run, self._axes.forces, self._measurement.torques
         q = np.array(self._q)
         moved = q - (q if run.before is None else run.before)
         run.before = q
-        for axis in axes[:1]:
-            run.resting.judge(self._q, axis, self._measurement, self._axes.forces, float(torques.sd.max()))
-        known = [self._doubting(axis, self._believe(self._q, axis, axes), contact) for axis in axes]
-        run.move(moved, axes, self._axes.forces, self._q)
+        run.judge(self._q, self._measurement, forces)
+        for one in run.axes:
+            one.known = self._doubting(one.now, self._believe(self._q, one.now), contact)
+        run.move(moved, forces, self._q)
         found: list[Event] = []
         if run.is_moving:
             found.append(holding(Code.REFUSED, "moved_fast", speed=FORCE.fast))
-        is_led = is_led or not all(axis.is_force for axis in axes)
-        covers = {axis.place.cover for axis in axes if axis.place}
+        is_led = is_led or not all(one.now.is_force for one in run.axes)
+        covers = {one.now.place.cover for one in run.axes if one.now.place}
         probable = contact.probability >= own.link_probability_limit
-        touched = contact.cover if probable and contact.cover not in covers else ""
-        for axis, one, belief in zip(axes, run.axes, known, strict=True):
+        touched = contact.cover if covers and probable and contact.cover not in covers else ""
+        for one in run.axes:
+            axis, known = one.now, one.known
             if not (axis.is_force and axis.desired):
                 continue
-            size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, belief.force))
+            size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
             one.watch.touch.step(force, size, dt)
-            way = 0.0 if run.held.at is not None or axis.is_joint else float(axis.along @ moved)
+            way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along @ moved)
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
-            seen = Seen(belief, way, touched if covers and is_touched else "", is_led)
-            found += one.watch.step(axis, seen, torques.now, own, dt)
-        if axes and run.is_touching and not any(event.holds for event in found):
+            found += one.watch.step(axis, Seen(known, way, touched if is_touched else "", is_led), torques.now, own, dt)
+        if run.axes and run.is_touching and not any(event.holds for event in found):
             self._pressed_at = q
         if run.free_at is None or not (contact.cover or run.is_touching):
             run.free_at = q
-        return found, known
+        return found
 
     def _doubting(self, axis: CommandedAxis, known: Belief, contact: Contact) -> Belief:
         """The same where it is not known which link is touched: the force on another one may be meant, too."""
@@ -338,14 +343,10 @@ class ForceLoop:
         apart *= math.sqrt(contact.probability * (1.0 - contact.probability))  # sd of one of two forces
         return known._replace(errors=known.errors._replace(place=math.hypot(known.errors.place, apart)))
 
-    def _believe(self, q: Sequence[float], axis: CommandedAxis, axes: Sequence[CommandedAxis]) -> Belief:
-        """What is known in a pose of the force along an axis of those that are commanded."""
-        size = abs(axis.desired)
-        if axis.is_joint:  # the torques of the joints are one vector
-            size = math.hypot(*(one.desired for one in axes if one.is_joint))
-        own, torques = self.parameters, self._measurement.torques
-        known = self._run.believe(axis, size, torques, own)
-        place = axis.place
+    def _believe(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
+        """What is known in a pose of the force along an axis."""
+        own, torques, place = self.parameters, self._measurement.torques, axis.place
+        known = self._run.believe(axis, torques, own)
         if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
             return known
         along = self._body.cover_pose(q, place.cover).rotation[:, 0]
@@ -355,12 +356,10 @@ class ForceLoop:
         sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
         place = place._replace(position_sd=max(sd, own.contact_position_sd))
         touched = axis._replace(sensed=self._axes.forces.axis(q, place.pressed(axis.direction, axis.desired)))
-        return known._replace(errors=self._run.believe(touched, size, torques, own).errors)
+        return known._replace(errors=self._run.believe(touched, torques, own).errors)
 
     def _move(
         self,
-        axes: Sequence[CommandedAxis],
-        known: Sequence[Belief],
         found: Sequence[Event],
         contact: Contact,
         posture: Sequence[float],
@@ -370,11 +369,11 @@ class ForceLoop:
     ) -> tuple[Array, list[float], list[Event]]:
         """Joint velocities and torques (n,), and what limits them."""
         own, run, q = self.parameters, self._run, np.array(self._q)
+        axes = [one.now for one in run.axes]
         holds = any(event.holds for event in found)
         factor = self._supervision.factor(lambda: self._guarded(axes, contact), dt) if axes else 1.0
         wanted = own.posture_gain * (np.array(posture) + run.approached - q) + (0.0 if rate is None else np.array(rate))
         wanted = np.minimum(np.maximum(wanted, -own.joint_speed_limit), own.joint_speed_limit)  # np.clip takes longer
-        rows, least = list[VelocityRow](), list[VelocityRow]()
         is_watched = bool(axes) and own.is_estimated and not run.is_touching
         is_watching = is_watched and run.shaking.is_watching(self._q, self._axes.forces, self._supervision.servo, dt)
         torque_sd = self._measurement.torques.sd
@@ -382,15 +381,18 @@ class ForceLoop:
             run.still_sd = torque_sd
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
+        rows = list[VelocityRow]()
         if holds:
-            inertia = self._axes.forces.moved_inertia(self._q)
-            wanted = run.held.velocity(self._q, self._hold_at(axes, found), inertia, allowed, own)
+            run.held_at = self._hold_at(found) if run.held_at is None else run.held_at
+            wanted = np.clip(own.posture_gain * (run.held_at - q), -own.joint_speed_limit, own.joint_speed_limit)
+            # what it may hit on its way back after a push
+            wanted = calm(wanted, self._axes.forces.moved_inertia(self._q), own.impact_energy(allowed))
         else:
-            run.held.at = None
-            rows = self._rows(axes, known, factor, is_watching, dt)
+            run.held_at = None
+            rows = self._rows(factor, is_watching, dt)
             if rate is None:
-                wanted = self._slowed(axes, rows, wanted)
-        least += self._pushes(axes, forces, known, contact, holds, allowed, dt)
+                wanted = self._slowed(rows, wanted)
+        least = self._pushes(forces, contact, holds, allowed, dt)
         low, high = joint_bounds(self._q, self._body.arm.joints, own)
         is_yielding = self._pushed.event is not None or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
         if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
@@ -401,44 +403,39 @@ class ForceLoop:
             limits += self._at_ends(unlimited, velocity)
         effort = [0.0] * len(q)
         if axes and not holds:
-            fed = self._fed(axes, known, dt)
+            fed = self._fed(dt)
             effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces else fed.tolist()
         return velocity, effort, limits
 
-    def _hold_at(self, axes: Sequence[CommandedAxis], found: Sequence[Event]) -> Array:
+    def _hold_at(self, found: Sequence[Event]) -> Array:
         """Where the arm is to hold (n,), rad: here, or off another link, where it last was free."""
-        q = np.array(self._q)
+        run, q = self._run, np.array(self._q)
         is_elsewhere = any(event.holds and event.code is Code.UNEXPLAINED for event in found)
-        if not is_elsewhere or self._run.free_at is None or not axes or not axes[0].along.any():
+        if not is_elsewhere or run.free_at is None or not run.axes or not run.axes[0].now.along.any():
             return q
-        along = axes[0].along
-        return self._run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
+        along = run.axes[0].now.along
+        return run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
 
-    def _fastest(self, axis: CommandedAxis) -> float:
-        """Largest speed along an axis, m/s or rad/s."""
-        return self.parameters.task.fastest(axis.is_joint)[0]
-
-    def _rows(
-        self, axes: Sequence[CommandedAxis], known: Sequence[Belief], factor: float, is_watching: bool, dt: float
-    ) -> list[VelocityRow]:
+    def _rows(self, factor: float, is_watching: bool, dt: float) -> list[VelocityRow]:
         """The commanded velocity along each axis; none while the arm is watched before it moves."""
         run, own = self._run, self.parameters
-        speeds = [self._speed(i, axis, known[i], factor, dt) for i, axis in enumerate(axes)]
+        speeds = [self._speed(one, factor, dt) for one in run.axes]
         watch = self._supervision.watch
-        is_assessed = watch is None or bool(watch.assessed) or all(axis.sensed is None for axis in axes)
+        is_assessed = watch is None or bool(watch.assessed) or all(one.now.sensed is None for one in run.axes)
         if is_watching or not is_assessed:
             speeds = [0.0] * len(speeds)
         run.delayed.append(speeds)
         while len(run.delayed) > own.delay_samples + 1:
             run.delayed.popleft()
         late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)
-        return [VelocityRow(axis.along, speed) for axis, speed in zip(axes, late, strict=True)]
+        return [VelocityRow(one.now.along, speed) for one, speed in zip(run.axes, late, strict=True)]
 
-    def _speed(self, i: int, axis: CommandedAxis, known: Belief, factor: float, dt: float) -> float:
+    def _speed(self, one: AxisRun, factor: float, dt: float) -> float:
         """Commanded speed along one axis, m/s or rad/s."""
-        own, one, fastest = self.parameters, self._run.axes[i], self._fastest(axis)
+        own, axis, known = self.parameters, one.now, one.known
+        fastest = own.task.fastest(axis.is_joint)[0]
         if axis.is_force:
-            speed = self._force_speed(i, axis, known, factor, dt)
+            speed = self._force_speed(one, factor, dt)
             return min(max(speed, -fastest), fastest) if len(self._run.axes) > 1 else speed
         goal = one.goal(axis, dt, own.limits.settling_time)
         if axis.of.kind is AxisKind.VELOCITY:
@@ -454,9 +451,9 @@ class ForceLoop:
             speed = axis.side * axis.of.rate + yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
-    def _force_speed(self, i: int, axis: CommandedAxis, known: Belief, factor: float, dt: float) -> float:
+    def _force_speed(self, one: AxisRun, factor: float, dt: float) -> float:
         """The law of a force or a torque, as fast as the limits allow."""
-        own, one = self.parameters, self._run.axes[i]
+        own, axis, known = self.parameters, one.now, one.known
         error, before = axis.desired - known.force, axis.desired - known.before
         if axis.sensed is None:
             return factor * self._supervision.torque_law.velocity(axis.of.joint, error, before, dt)
@@ -473,12 +470,13 @@ class ForceLoop:
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
 
-    def _slowed(self, axes: Sequence[CommandedAxis], rows: Sequence[VelocityRow], wanted: Array) -> Array:
+    def _slowed(self, rows: Sequence[VelocityRow], wanted: Array) -> Array:
         """Velocities of the posture (n,), rad/s, at which the forces stay right."""
         run, own = self._run, self.parameters
         if any(one.is_kept for one in run.axes) and float(np.abs(wanted).max()) < FORCE.slow_posture:
             return np.zeros_like(wanted)
-        for axis, one in zip(axes, run.axes, strict=True):
+        for one in run.axes:
+            axis = one.now
             if axis.is_force and axis.desired and axis.place and one.watch.touch.has_been and own.limits.impact:
                 far = np.full(len(wanted), math.inf)
                 left = solve([row._replace(speed=0.0) for row in rows], wanted, [], -far, far).velocity
@@ -486,28 +484,21 @@ class ForceLoop:
         return wanted
 
     def _pushes(
-        self,
-        axes: Sequence[CommandedAxis],
-        forces: Sequence[CommandedAxis],
-        known: Sequence[Belief],
-        contact: Contact,
-        holds: bool,
-        allowed: float,
-        dt: float,
+        self, forces: Sequence[CommandedAxis], contact: Contact, holds: bool, allowed: float, dt: float
     ) -> list[VelocityRow]:
         """What pushes harder than allowed."""
-        own, torques = self.parameters, self._measurement.torques
+        own, run, torques = self.parameters, self._run, self._measurement.torques
         # whatever is touched is loaded by the arm's own motion, also where that is not along the commanded force
-        has_touched = contact.cover or any(one.watch.touch.has_been for one in self._run.axes)
+        has_touched = contact.cover or any(one.watch.touch.has_been for one in run.axes)
         pressed = math.fsum(axis.desired for axis in forces) if has_touched else 0.0
         if not holds:
             allowed = own.limits.contact_force
-            if pressed and len(forces) == len(axes):
+            if pressed and len(forces) == len(run.axes):
                 allowed = min(allowed, own.limits.whole_force * pressed)
-        now = torques.now - self._run.resting.torques
+        now = torques.now - run.resting
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._q) @ torques.acceleration
-        chi2 = max((one.chi2 for one in known), default=0.0)
+        chi2 = max((one.known.chi2 for one in run.axes), default=0.0)
         gain = self._supervision.present * max(own.force_gain)
         torques = torques._replace(now=now)
         return self._pushed.step(self._q, forces, torques, contact, chi2, allowed, bool(pressed), gain, own, dt)
@@ -528,7 +519,7 @@ class ForceLoop:
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _fed(self, axes: Sequence[CommandedAxis], known: Sequence[Belief], dt: float) -> Array:
+    def _fed(self, dt: float) -> Array:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
         The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
@@ -536,12 +527,13 @@ class ForceLoop:
         """
         own, run = self.parameters, self._run
         at_once, later = np.zeros(len(self._q)), np.zeros(len(self._q))
-        for axis, belief, one in zip(axes, known, run.axes, strict=True):
+        for one in run.axes:
+            axis = one.now
             if axis.is_force:
                 at_once += own.force_feedforward * axis.desired * axis.along
                 if run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
                     if math.isnan(one.wound):
-                        one.wound = belief.force * own.is_estimated
+                        one.wound = one.known.force * own.is_estimated
                     later += ((1.0 - own.force_feedforward) * axis.desired - one.wound) * axis.along
         if own.limits.impact:
             missing = later - run.fed
@@ -551,7 +543,6 @@ class ForceLoop:
 
     def _watch_motions(
         self,
-        axes: Sequence[CommandedAxis],
         found: Sequence[Event],
         posture: Sequence[float] | None,
         rate: Sequence[float] | None,
@@ -566,36 +557,54 @@ class ForceLoop:
             return []
         lasting = FORCE.quarter * own.limits.settling_time
         events = []
-        for axis, one in zip(axes, run.axes, strict=True):
+        for one in run.axes:
+            axis = one.now
             if axis.of.kind in (AxisKind.POSITION, AxisKind.VELOCITY):
                 speed = axis.of.rate if axis.of.kind is AxisKind.POSITION else axis.of.value or 0.0
-                law = (own.task.largest_rate, self._fastest(axis))
+                law = (own.task.largest_rate, own.task.fastest(axis.is_joint)[0])
                 goal = one.goal(axis, 0.0, math.inf)
                 events.append(one.motion.step(axis.of.name, axis.of.unit, goal, speed, axis.at, *law, lasting, dt))
-        if not axes and posture is not None and own.mode == "hybrid":
+        if not run.axes and posture is not None and own.mode == "hybrid":
             law, rates = (own.posture_gain, own.joint_speed_limit), rate or [0.0] * len(self._q)
             for (name, watch), goal, speed, at in zip(run.joints.items(), posture, rates, self._q, strict=True):
                 events.append(watch.step(name, "rad", goal, speed, at, *law, lasting, dt))
         return [event for event in events if event]
 
-    def _advised(self, found: list[Event], task: TaskCommand | None, axes: Sequence[CommandedAxis]) -> list[Event]:
+    def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
         """With what would help a refused force, which is looked for over several periods."""
+        run = self._run
         is_refused = any(event.holds and event.cause == "error" for event in found)
-        if not is_refused or task is None or len(axes) > 1 or (place := axes[0].place) is None:
-            self._run.advice = Advice()
+        if not is_refused or task is None or len(run.axes) > 1 or (place := run.axes[0].now.place) is None:
+            run.search, run.ways = None, {}
             return found
-        self._run.advice.step(
-            lambda: tries(
-                self._q,
-                task,
-                place,
-                self._axes,
-                self._body.arm.joints,
-                lambda q, axis: self._believe(q, axis, [axis]),
-                self.parameters,
-            )
+        run.search = run.search or tries(
+            self._q, task, place, self._axes, self._body.arm.joints, self._believe, self.parameters
         )
-        return [event.with_values(**self._run.advice.ways) if event.cause == "error" else event for event in found]
+        for ways in islice(run.search, FORCE.each):
+            run.ways |= ways
+        return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
+
+    def _output(self, velocity: Array, effort: list[float], frame: str, is_task: bool) -> ForceOutput:
+        measured, error, limited = np.zeros(3), np.zeros(3), np.zeros(3)
+        each = self._run.axes
+        for axis, known in ((one.now, one.known) for one in each):
+            if axis.is_force and axis.sensed is not None:
+                law = self._supervision.force_law.along(axis.in_frame.tolist())
+                off = axis.desired - known.force
+                measured += known.force * axis.in_frame
+                error += off * axis.in_frame
+                limited += law.limited(0, off) * axis.in_frame
+        return ForceOutput(
+            velocity.tolist(),
+            effort,
+            _triple(measured),
+            _triple(error),
+            _triple(limited),
+            frame,
+            tuple(one.now for one in each),
+            tuple(one.known for one in each),
+            tuple(map(_row, each)) if is_task else (),
+        )
 
 
 def _task(commands: Commands, task: TaskCommand | None, own: ForceLoopParameters) -> tuple[TaskCommand | None, object]:
@@ -625,40 +634,9 @@ def _by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
     return tuple(sorted(each.values(), key=lambda event: (not event.holds, event.code.number)))
 
 
-def _output(
-    velocity: Array,
-    effort: list[float],
-    axes: Sequence[CommandedAxis],
-    known: Sequence[Belief],
-    frame: str,
-    supervision: Supervision,
-    is_task: bool,
-    run: CommandRun,
-) -> ForceOutput:
-    measured, error, limited = np.zeros(3), np.zeros(3), np.zeros(3)
-    for axis, belief in zip(axes, known, strict=True):
-        if axis.is_force and axis.place is not None and axis.sensed is not None:
-            law = supervision.force_law.along(axis.in_frame.tolist())
-            off = axis.desired - belief.force
-            measured += belief.force * axis.in_frame
-            error += off * axis.in_frame
-            limited += law.limited(0, off) * axis.in_frame
-    rows = [_row(axis, belief, one.anchor) for axis, belief, one in zip(axes, known, run.axes, strict=True)]
-    return ForceOutput(
-        velocity.tolist(),
-        effort,
-        _triple(measured),
-        _triple(error),
-        _triple(limited),
-        frame,
-        tuple(axes),
-        tuple(known),
-        tuple(rows) if is_task else (),
-    )
-
-
-def _row(axis: CommandedAxis, known: Belief, anchor: float) -> AxisRow:
-    commanded = axis.desired if axis.is_force else anchor if axis.of.value is None else axis.of.value
+def _row(one: AxisRun) -> AxisRow:
+    axis, known = one.now, one.known
+    commanded = axis.desired if axis.is_force else one.anchor if axis.of.value is None else axis.of.value
     sign = 1.0 if axis.is_force else axis.side
     measured = sign * known.force if axis.of.is_sensed else axis.at
     fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction

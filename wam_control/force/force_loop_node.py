@@ -151,7 +151,6 @@ class ForceLoopNode:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, events = self._loop.report, self._loop.events
         refusals = self.refusals
-        refusals.pop("contact/hypotheses", None)
         commanded: tuple[str, ...] = ()
         if refusals or any(event.holds for event in events):  # of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]

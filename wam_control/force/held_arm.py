@@ -1,4 +1,4 @@
-"""An arm that holds its position, and what pushes an arm in all: it gives way, and no further than allowed."""
+"""What pushes an arm in all: it gives way, and no further than allowed."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import WorldTorques
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import WorldPush, calm, certain_size, likeliest_link
+from wam_control.force.limits import WorldPush, certain_size, likeliest_link
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
@@ -17,39 +17,6 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 
 Array = NDArray[np.float64]
-
-
-class HeldArm:
-    """Position that the arm holds while it does not obey a command.
-
-    It goes back there after a push, with no more energy than it may hit something with.
-
-    Attributes
-    ----------
-    at : joint angles (n,), rad; None while the command is obeyed.
-    """
-
-    def __init__(self) -> None:
-        self.at: Array | None = None
-
-    def velocity(
-        self, q: Sequence[float], at: Array, inertia: Array, allowed: float, own: ForceLoopParameters
-    ) -> Array:
-        """Velocities of the posture (n,), rad/s.
-
-        Parameters
-        ----------
-        q : joint angles (n,), rad.
-        at : where to hold (n,), rad, if it does not hold yet.
-        inertia : at the joints, with rotors (n, n), kg m^2.
-        allowed : force, N, with which the arm may hit something.
-        own : parameters of the force loop.
-        """
-        if self.at is None:
-            self.at = at
-        wanted = own.posture_gain * (self.at - np.array(q))
-        limited = np.clip(wanted, -own.joint_speed_limit, own.joint_speed_limit)
-        return calm(limited, inertia, own.impact_energy(allowed))
 
 
 class PushedArm:

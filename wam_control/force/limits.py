@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.belief import yielding
 from wam_control.force.force_axis import ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.problem import VelocityRow
@@ -39,6 +38,11 @@ def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -
 def accelerated(low: Array, high: Array, before: Array, step: float) -> tuple[Array, Array]:
     """Bounds (n,), rad/s, within a step of the velocities before (n,), rad/s; those of the speed come first."""
     return np.minimum(np.maximum(low, before - step), high), np.maximum(np.minimum(high, before + step), low)
+
+
+def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
+    """How far the stiffest surface and the cables yield to a force, m/N."""
+    return 1.0 / own.guard.contact_stiffness + sensed.compliance
 
 
 def latency(own: ForceLoopParameters) -> float:
