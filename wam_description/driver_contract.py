@@ -85,7 +85,7 @@ REQUIREMENTS: Final = {
         "refuse stamps that are not above 0 and at most that of the newest state",
     ),
     "watchdog": Requirement(
-        "stops the current 50 ms after the last command, and faults",
+        "stops the current at most 50 ms after the last command, and faults",
         "compare the newest state with the stamp of the last command in every period",
     ),
     "repetition": Requirement(

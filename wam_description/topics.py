@@ -223,7 +223,7 @@ TOPICS: Final = (
     _joints(
         "joint_posture_command",
         "outer",
-        "posture that the arm holds in all directions without a force, rad; if the posture moves, also its velocity, "
+        "joint angles, rad; the arm holds them, but not along a commanded force; if they move, also their velocity, "
         "rad/s",
     ),
     Topic(
@@ -233,8 +233,12 @@ TOPICS: Final = (
         "postures to go through, rad, streamed by your program in place of `joint_posture_command`",
         "joints",
     ),
-    _joints("joint_torque_command", "outer", "joint torques commanded by your program in the mode joint_torque, N m"),
-    Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero releases the force axis"),
+    _joints(
+        "joint_torque_command",
+        "outer",
+        "joint torques commanded by your program, N m; used only with the parameter `mode: joint_torque` of force_loop",
+    ),
+    Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero ends it"),
     Topic(
         "task_command",
         TABLE,
@@ -254,7 +258,7 @@ TOPICS: Final = (
     Topic(
         "force_measured", WRENCH, "outer", "force of the arm on the world along the commanded direction, measured, N"
     ),
-    Topic("force_error", WRENCH, "outer", "F_error = F_des - F_c before saturation, N"),
+    Topic("force_error", WRENCH, "outer", "F_error, commanded less measured force, before saturation, N"),
     Topic("force_error_limited", WRENCH, "outer", "F_error after saturation, N"),
     Topic(
         "force_axis",
@@ -267,8 +271,8 @@ TOPICS: Final = (
     _joints(
         "external_torque_zero",
         "outer",
-        "effort = torques of the joint sensors that count as zero force, N m, set by `~/tare` or at the "
-        "start of a force; the estimator corrects the arm's weight with them",
+        "effort = torques of the joint sensors that count as zero force, N m; set by `wam call tare` and when a force "
+        "begins; the estimator corrects the arm's weight with them",
     ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
@@ -296,7 +300,7 @@ TOPICS: Final = (
         "contact/tracked_friction",
         TABLE,
         "1 Hz",
-        "tracked friction, one row per shaft, motors first; only if motors are observed; float64 "
+        "tracked friction, one row per shaft, motors first; only if the estimator uses no joint sensors; float64 "
         "columns: see docs/estimator.md",
         columns=FRICTION_COLUMNS,
     ),
@@ -327,8 +331,8 @@ TOPICS: Final = (
         "sim/disturbance",
         WRENCH,
         "outer",
-        "a push: force and torque at the origin of the cover frame_id, N and N m; the push ends `ages.command` after "
-        "the last message, or with a push on another cover",
+        "a push: force and torque at the origin of the cover frame_id, N and N m. There is one push at a time; it ends "
+        "`ages.command` after the last message, or with a push on another cover",
     ),
     Topic("robot_description", STRING, "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node; each node latches its own"),

@@ -63,8 +63,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         type=_axis,
         metavar="NAME=VALUES",
-        help="parameter and its values, for example 'force_loop:force_gain=0.005,0.01'; LOW:HIGH:N gives N values with "
-        "a constant ratio; may be repeated",
+        help="parameter and its values, for example 'force_loop:force_gain=0.005,0.01'; LOW:HIGH:N gives N "
+        "logarithmically spaced values; may be repeated",
     )
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(

@@ -39,18 +39,18 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force on the world, N, in `base` or in the "
-    "frame of a link. Optional: `contact_position`, where the force acts, m along the link; `rise`, its rise time, s",
+    "frame of a cover. Optional: `contact_position`, where it acts, m along the cover; `rise`, its rise time, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
-    "torque": "the torque of each joint, N m",
+    "torque": "the torque of each joint on the world, N m; it is sent as a `task`",
     "until_force": "force, N; the step ends when a contact with this force is detected, and fails without one",
-    "chirp": "`{newtons, from, to}`: adds a sine to `force`, along it. `newtons` is its amplitude, N; its frequency "
-    "goes from `from` to `to`, Hz",
-    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm on a link "
-    "(`cover`). `contact_position` is in m along the link, `newtons` in the frame of the link. Optional: `begin` and "
-    "`end`, s from the start of the step",
+    "chirp": "`{newtons, from, to}`: adds a sine to `force`, in the same direction. `newtons`: amplitude, N. The "
+    "frequency goes from `from` to `to`, Hz",
+    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "
+    "`contact_position` is in m along the cover, `newtons` in its frame. Optional: `begin` and `end`, s from the start "
+    "of the step",
     "request": "`enable` or `disable`, or `tare` of an arm at rest, at the start of the step",
-    "set": "`{force_loop: {force_gain: [0.01]}}`: sets live parameters of driver or force_loop at the start of the "
-    "step",
+    "set": "`{force_loop: {force_gain: [0.01]}}`: sets parameters of driver or force_loop at the start of the step, "
+    "those that may change while the node runs (*live* parameters)",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
