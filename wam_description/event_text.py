@@ -25,7 +25,7 @@ REASONS: Final = {
     Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is 1 minus the sum of those "
     "of the links",
     Reason.TOO_EARLY: "too few samples so far",
-    Reason.BRAKED: "brakes hold the motors",
+    Reason.BRAKED: "the arm is braked",
 }
 
 PINNED: Final = (

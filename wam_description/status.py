@@ -76,34 +76,34 @@ def diagnosed_name(namespace: str, node: str) -> str:
 def guidance(
     mode: str,
     before: str,
-    absent: Sequence[str],
+    waits: Sequence[str],
     faulty: Sequence[str],
     namespace: str,
     is_played: bool,
-    held: str = "the brakes are on",
+    held: str,
 ) -> str:
     """What the console shows of the driver's state, and what to call next.
 
     Parameters
     ----------
     mode, before : the driver's state, and that before it, '' at the start.
-    absent : nodes that are not connected yet.
+    waits : what a braked driver waits for.
     faulty : nodes that report a fault.
     namespace : of the arm.
     is_played : whether a scenario makes the calls.
     held : what holds an arm that is not enabled.
     """
-    if absent:
-        return f"{mode}; not connected yet: {', '.join(absent)}"
+    if mode == "braked" and waits:
+        return f"braked; {'; '.join(waits)}"
     if mode == "braked" and faulty:
         return f"braked; a fault is reported by {', '.join(faulty)}: enable is refused until it is over"
     if mode == ENABLED:
-        return "enabled: the brakes are released"
+        return "enabled: the motors follow the commands"
     if is_played or (mode == "braked" and before == ENABLED):
         return f"{mode}: {held}"
     if mode == "braked":
         call = _call(namespace, "enable", "SetBool '{data: true}'")
-        return f"braked, all nodes are connected; to release the brakes: {call}"
+        return f"braked, all nodes are connected; to enable the arm: {call}"
     return f"fault, {held}; when its cause is gone: {_call(namespace, 'reset_fault', 'Trigger')}, then enable"
 
 

@@ -41,15 +41,14 @@ class ArmDriver(StackNode):
     session : that the other nodes follow.
     lateness : how many periods were late and what to do about it, '' where few were.
     warnings : what a person should know, though the arm may move.
-    unready : what the arm still lacks before the brakes may be released, '' where nothing.
+    unready : what the arm still lacks before it may be enabled, '' where nothing.
+    advice : what a person at the arm has to do for that, '' where nothing.
     is_paused : whether the time of the arm is stopped.
-    held : what holds the arm while it is not enabled.
     """
 
     is_first = True
     safety: Safety
-    lateness = unready = ""
-    held = "the brakes are on"
+    lateness = unready = advice = ""
     warnings: tuple[str, ...] = ()
     is_paused = False
 
@@ -60,7 +59,7 @@ class ArmDriver(StackNode):
         self.session = Session(chain, 0 if is_lockstep else int(time.time() * 1e3))  # ms: no driver before had it
         self._mode, self._answered = Mode.BRAKED, 0  # newest state, ns, that a command has answered
         self._reported: tuple[Any, ...] = ("",)
-        self._informed: tuple[str, bool, tuple[str, ...]] = ("", True, ())  # mode, are nodes missing, faulty nodes
+        self._informed = ("", True, tuple[str, ...](), "")  # mode, are nodes missing, faulty nodes, advice
         self.inlets.feed("motor_current_command", self._take_currents, "effort")
         self.serve("enable", SetBool, lambda request: self.enable() if request.data else self.brake())
         self.serve("estop", Trigger, lambda _: self.estop())
@@ -80,11 +79,11 @@ class ArmDriver(StackNode):
         raise NotImplementedError
 
     def release(self, obstacle: str) -> Answer:
-        """Release the brakes and discard every command before, unless an obstacle is named."""
+        """Let the motors follow commands from now on, unless an obstacle is named."""
         raise NotImplementedError
 
     def brake(self) -> Answer:
-        """Put on the brakes at once."""
+        """Brake at once."""
         raise NotImplementedError
 
     def clear(self) -> Answer:
@@ -112,7 +111,7 @@ class ArmDriver(StackNode):
         self.create_service(kind, f"~/{name}", served)
 
     def enable(self) -> Answer:
-        """Release the brakes, unless there is a reason against it."""
+        """Let the motors follow commands, unless there is a reason against it."""
         if self.safety.mode is Mode.ENABLED:
             return Answer(True, "enabled already: nothing has changed")
         rival = TWO_DRIVERS if self.count_publishers("motor_states") > 1 else ""
@@ -122,7 +121,7 @@ class ArmDriver(StackNode):
     def estop(self) -> Answer:
         """Stop at once and latch a fault."""
         self.trip(fault("emergency_stop"))
-        return Answer(True, "fault: emergency stop, brakes on; call reset_fault, then enable")
+        return Answer(True, f"fault: emergency stop; {self.safety.held}; call reset_fault, then enable")
 
     def end(self) -> None:
         """Put on the brakes at once; the others hear of it when the node is destroyed."""
@@ -221,10 +220,12 @@ class ArmDriver(StackNode):
     def _inform(self) -> None:
         """Print on the console what the driver's state is and what to call next, where that has changed."""
         mode, absent = self.health.status.mode, self.peers.absent
-        faulty = tuple(self.peers.faulty) if mode == Mode.BRAKED.value else ()
-        state = (mode, bool(absent), faulty)
+        is_braked = mode == Mode.BRAKED.value
+        faulty, advice = (tuple(self.peers.faulty), self.advice) if is_braked else ((), "")
+        state = (mode, bool(absent), faulty, advice)
         if mode and state != self._informed:
             before, self._informed = self._informed[0], state
             is_played = "scenario" in self.shared.nodes
-            text = guidance(mode, before, absent, faulty, self.get_namespace(), is_played, self.held)
+            waits = [f"not connected yet: {', '.join(absent)}"] * bool(absent) + [advice] * bool(advice)
+            text = guidance(mode, before, waits, faulty, self.get_namespace(), is_played, self.safety.held)
             self.get_logger().info(text)

@@ -18,13 +18,18 @@ class Mode(Enum):
 class Safety:
     """State machine of the driver: it starts braked; a fault is latched; its reset never enables.
 
+    Parameters
+    ----------
+    held : what holds an arm that is not enabled; a real one has no brakes.
+
     Attributes
     ----------
     mode : present state.
     events : the first fault since the last reset, and the first damage under the brakes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, held: str = "the brakes are on") -> None:
+        self.held = held
         self.mode = Mode.BRAKED
         self.events: tuple[Event, ...] = ()
 
@@ -34,19 +39,19 @@ class Safety:
         return "; then ".join(map(sentence, self.events))
 
     def enable(self, obstacle: str) -> Answer:
-        """Release the brakes, unless `obstacle` names a reason against it."""
+        """Let the motors follow commands, unless `obstacle` names a reason against it."""
         if self.mode is Mode.FAULT:
             return Answer(False, f"refused: fault '{self.fault}' is latched; call reset_fault first, then enable")
         if obstacle:
             return Answer(False, f"refused: {obstacle}")
         self.mode = Mode.ENABLED
-        return Answer(True, "enabled: brakes released")
+        return Answer(True, "enabled: the motors follow the commands")
 
     def disable(self) -> Answer:
-        """Put on the brakes; works in every state and keeps a latched fault."""
+        """Brake; works in every state and keeps a latched fault."""
         if self.mode is Mode.ENABLED:
             self.mode = Mode.BRAKED
-        return Answer(True, f"{self.mode.value}: brakes on, currents zero")
+        return Answer(True, f"{self.mode.value}: currents zero; {self.held}")
 
     def trip(self, event: Event) -> None:
         """Latch a fault; the first one is kept."""

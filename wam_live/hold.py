@@ -13,7 +13,7 @@ from wam_ros.messages import message_type
 from wam_ros.topics import qos
 from wam_ros.wire import encoder
 
-KEYS: Final = {"sim/disturbance": "key push", "force_command": "key force"}
+KEYS: Final = {"sim/disturbance": "push", "force_command": "force"}  # of a step of a scenario
 
 
 class HeldTopic:
@@ -30,6 +30,7 @@ class HeldTopic:
 
     def __init__(self, node: Node, topic: str, shared: Shared) -> None:
         self._node, self._topic = node, topic
+        self._is_taken = shared.is_simulated or not topic.startswith("sim/")
         self._encode = encoder(BY_NAME[topic], shared)
         self._publisher: Any = None
 
@@ -40,13 +41,16 @@ class HeldTopic:
 
     def send(self, stamp: int, value: Wrench) -> str:
         """Publish a value as the answer to a state, ns; returns why that is not possible, '' where it is."""
+        if not self._is_taken:
+            return f"the driver of this arm does not take {self._topic}, which is for a simulated arm; push it by hand"
         others = self._node.count_publishers(self._topic) - self.is_on
         if others > 0:
             self.end()
+            key = KEYS[self._topic]
             return (
-                f"another program publishes {self._topic}, as a scenario does, with or without one of its own; the arm "
-                f"takes it from one program alone: put it into a step of the scenario ({KEYS[self._topic]}), or start "
-                "the stack without one: wam up"
+                f"another program publishes {self._topic}; a scenario does from its start to its end, also in steps "
+                f"without a {key}; the arm takes the topic from one program alone: write the {key} into a step of the "
+                f"scenario (key {key}), or start the stack without a scenario: wam up"
             )
         if self._publisher is None:
             row = BY_NAME[self._topic]

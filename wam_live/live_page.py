@@ -153,7 +153,7 @@ class ShownStack:
         """Stream the push of a drag until its end; end a force whose arm has stopped."""
         if self._press is not None and not self._is_enabled:
             self._end_press()
-            self.panel.notify("letting go: the brakes are on")
+            self.panel.notify("letting go: the arm is not enabled")
         if push is None:
             release(self._push, self._source.stamp)
         elif refusal := self._push.send(self._source.stamp, push):

@@ -476,6 +476,8 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     hold = HeldTopic(page, "sim/disturbance", CONFIGURATION.shared)
     count = lambda: listener.count_publishers("sim/disturbance")  # noqa: E731
     push = Wrench("outer_link", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    real = HeldTopic(page, "sim/disturbance", replace(CONFIGURATION.shared, nodes=("mine:Driver",)))
+    assert "does not take sim/disturbance, which is for a simulated arm" in real.send(1, push)
     assert hold.send(1, push) == ""
     ros.wait(lambda: count() == 1 and (hold.send(1, push), heard)[1])
     hold.send(1, Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from ros_network import Network
 
 from wam_cli.commands.conform import driver_alone, on_bus
@@ -11,7 +12,9 @@ from wam_driver.bus.safety_module import SafetyMode
 from wam_ros.node import make_node
 
 
-def test_the_status_states_what_a_person_has_to_do_and_which_fault_there_is(ros: Network, tmp_path: Path) -> None:
+def test_the_status_states_what_a_person_has_to_do_and_which_fault_there_is(
+    ros: Network, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     configuration = driver_alone(on_bus(Configuration.load(packaged("barrett-wam4-bus")), "simulated:200"))
     file = tmp_path / "parameters.yaml"
     file.write_text(configuration.text)
@@ -42,3 +45,7 @@ def test_the_status_states_what_a_person_has_to_do_and_which_fault_there_is(ros:
     ros.wait(lambda: not driver.unready)
     bus.on_line = lambda frame: [] if frame.sender == 2 else [frame]
     wait_for("motor controller 2 sends no position", Level.ERROR)
+    console = capfd.readouterr().err
+    assert "fault, only the windings of the motors brake, and the arm sinks; when its cause is gone: wam" in console
+    assert "brakes" not in console + driver.brake().message + driver.estop().message
+    assert console.rindex("Shift-Activate") < console.rindex("sends no position"), "not while a fault is latched"

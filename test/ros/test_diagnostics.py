@@ -63,20 +63,19 @@ def test_the_console_says_the_state_and_what_to_call_next(hand: Hand, capfd: pyt
         hand.ask(request, data)
     hand.wait_periods(1)
     release = (
-        "braked, all nodes are connected; to release the brakes: wam call enable "
+        "braked, all nodes are connected; to enable the arm: wam call enable "
         "(or: ros2 service call /wam/driver/enable std_srvs/srv/SetBool '{data: true}')"
     )
     fault = (
         "fault, the brakes are on; when its cause is gone: wam call reset_fault "
         "(or: ros2 service call /wam/driver/reset_fault std_srvs/srv/Trigger), then enable"
     )
-    released = "enabled: the brakes are released"
+    released = "enabled: the motors follow the commands"
     lines = [line.split("]: ")[1] for line in capfd.readouterr().err.splitlines() if "[INFO]" in line]
     assert lines == [released, fault, release, released, "braked: the brakes are on"]
     assert release in connected
 
 
-def test_the_console_names_the_nodes_that_are_missing_and_the_arm_that_is_called() -> None:
-    assert "not connected yet: gravity" in guidance("braked", "", ["gravity"], [], "/wam", False)
-    assert "wam call enable --namespace left " in guidance("braked", "", [], [], "/left", False)
-    assert "reported by gravity: enable is refused" in guidance("braked", "fault", [], ["gravity"], "/wam", False)
+def test_the_console_names_the_faulty_node_and_the_arm_that_is_called() -> None:
+    assert "wam call enable --namespace left " in guidance("braked", "", [], [], "/left", False, "")
+    assert "reported by gravity: enable is refused" in guidance("braked", "fault", [], ["gravity"], "/wam", False, "")

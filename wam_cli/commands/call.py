@@ -27,8 +27,8 @@ from wam_ros.messages import plain
 from wam_ros.process_signals import bound_leaving
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
-    "enable": ("release the brakes", (Call("driver", "enable", True),)),
-    "disable": ("put on the brakes", (Call("driver", "enable", False),)),
+    "enable": ("let the motors follow the commands", (Call("driver", "enable", True),)),
+    "disable": ("brake the arm", (Call("driver", "enable", False),)),
     "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
     "reset_fault": ("clear the latched fault", (Call("driver", "reset_fault"),)),
     "confirm_home": ("confirm that a real arm is at its home pose", (Call("driver", "confirm_home"),)),

@@ -25,7 +25,6 @@ class BusDriver(ArmDriver):
     """
 
     entry = "wam_driver.bus.interface:BusInterface"
-    held = "only the windings of the motors brake, and the arm sinks"
 
     def __init__(self, **ros: Any) -> None:
         super().__init__(declared(self.entry), **ros)
@@ -33,7 +32,7 @@ class BusDriver(ArmDriver):
             raise ParameterError("timing.mode is lockstep, which is for simulated arms; set it to realtime")
         self._watchdog = self.own.watchdog
         self.hardware: ArmBus = self.make_hardware(self.shared, self.own)
-        self.safety = Safety()
+        self.safety = Safety("only the windings of the motors brake, and the arm sinks")
         self._take_advice()
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
@@ -76,10 +75,8 @@ class BusDriver(ArmDriver):
         self.announce()
 
     def _take_advice(self) -> None:
-        advice = self.hardware.advice
-        if advice != self.unready:
-            self.get_logger().info(advice or "the arm is ready; it may be enabled when all nodes are connected")
-        self.unready, self.warnings = advice, (advice,) if advice else ()
+        self.advice = self.unready = advice = self.hardware.advice
+        self.warnings = (advice,) if advice else ()
 
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
