@@ -41,15 +41,19 @@ def declared(entry: str) -> Declaration:
             f"no node is named '{entry}'; nodes: {', '.join(NODES)}; name one of your own as my_package.module:Class"
         )
     try:
-        found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError) as error:
+        imported = importlib.import_module(module)
+    except ModuleNotFoundError as error:
         raise ParameterError(
-            f"node '{entry}' cannot be imported: {error}; check that '{module}' is installed or on PYTHONPATH"
+            f"node '{entry}' cannot be imported: {error}; check that '{error.name}' is installed or on PYTHONPATH"
         ) from error
     except Exception as error:
         raise ParameterError(f"node '{entry}' cannot be imported: {raised(error)}; correct '{module}'") from error
+    if not hasattr(imported, name):
+        classes = [key for key, one in vars(imported).items() if getattr(one, "__module__", "") == module]
+        there = ", ".join(classes) or "none"
+        raise ParameterError(f"node '{entry}': '{module}' has no class '{name}'; {meant(name, classes)}it has {there}")
     try:
-        return declaration(found)
+        return declaration(getattr(imported, name))
     except TypeError as error:
         raise ParameterError(f"node '{entry}': {error}") from error
 
@@ -94,7 +98,7 @@ def require_parameters(configuration: Configuration) -> None:
                 if one.name not in NODES or one.node.__module__.startswith("wam_"):
                     raise
                 shares = f"node '{entry}' has the name and so the parameters of the packaged node '{one.name}'"
-                raise ParameterError(f"{error}; {shares}: give it another name") from error
+                raise ParameterError(f"{shares}: give it another name; {error}") from error
             getattr(own, "require_fit", lambda arm: None)(shared.arm)
 
 
@@ -140,7 +144,7 @@ class Interface:
         self.declarations: dict[str, Declaration] = {}
         for one in found:
             if one.name in self.declarations:
-                raise ParameterError(f"two nodes of the configuration are named '{one.name}'; list one of them")
+                raise ParameterError(f"two nodes of the configuration are named '{one.name}'; list one of them, or rename your own")
             node = replaced.pop(one.name, None)
             self.declarations[one.name] = one if node is None else declaration(node)._replace(name=one.name)
         for name, node in replaced.items():

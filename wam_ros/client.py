@@ -42,7 +42,8 @@ class Reply(NamedTuple):
     def of(cls, request: Request, answer: Any) -> "Reply":
         """The answer of the service of a request."""
         refusal = refusal_of(request, answer)
-        return cls(not refusal, refusal or getattr(answer, "message", ""))
+        stated = answer.results[0].reason if isinstance(request, SetParameters) else answer.message
+        return cls(not refusal, refusal or stated)
 
 
 class NoAnswerError(OSError):

@@ -49,6 +49,7 @@ class Health:
     facts : further values for the diagnostics.
     live : present values of the shared parameters that the node owns, as facts of its status.
     problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
+    refused : newest reason for which a message was refused, by topic.
     unusable : why messages of a topic are refused, by topic, up to a report before which none was.
     session : of the driver that this node follows, 0 before it is known.
     is_ready : whether every expected peer is connected.
@@ -61,6 +62,7 @@ class Health:
         self.digests = digests(shared)
         self.live: dict[str, str] = {}
         self.problems: dict[str, Event] = {}
+        self.refused: dict[str, str] = {}
         self.unusable: dict[str, str] = {}
         self._unusable_since: dict[str, str] = {}  # the last report
         self.session = 0
@@ -176,6 +178,7 @@ class Health:
             is logged.
         """
         self.counts[REFUSED_ON + topic] += 1
+        self.refused[topic] = reason
         log, text = self._node.get_logger(), f"{topic}: refused: {printable(reason, NODE_LIMITS.reason_length)}"
         if is_reported:
             log.warning(text, throttle_duration_sec=NODE_LIMITS.log_period)

@@ -12,7 +12,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from wam_description.agreement import live_facts
@@ -254,6 +256,13 @@ class AdaptedNode(StackNode):
         self._report_change(values)
         if self._follower is not None:
             self._follower.settle()
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """As that of rclpy; the reason of a success states what applies where the node has lowered something."""
+        result = super().set_parameters_atomically(parameter_list)
+        if result.successful and (lowered := getattr(self.node, "lowered", "")):
+            result.reason = f"lowered to be stable, what applies now: {lowered}"
+        return result
 
     def _take_refusal(self, refusal: str) -> None:
         """A request was refused."""

@@ -19,7 +19,7 @@ from rclpy.publisher import Publisher
 from wam_bag.bag import Bag, read
 from wam_bag.columns import Columns, columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
-from wam_description.interface import Interface, declared
+from wam_description.interface import Interface, declared, require_parameters
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH
@@ -43,7 +43,7 @@ _COUNTER = itertools.count()
 
 
 class ArmFault(AssertionError):
-    """The driver has put on the brakes, and the test did not expect it."""
+    """The driver has braked, or a node refuses a message, and the test did not expect it."""
 
 
 @contextmanager
@@ -115,6 +115,7 @@ class RunningArm:
         self._domain_id, self._folder = domain_id, folder
         self._composition: Composition | None = None
         self.fault = ""
+        self._expected: set[str] = set()  # topics of which messages may be refused
 
     def start(
         self, *own: Any, configuration: str | Path | Configuration = "wam", nodes: Sequence[str] = (), **values: Any
@@ -137,6 +138,7 @@ class RunningArm:
         assert self._composition is None, "the stack of this test already runs; call start once, before all else"
         self.configuration = configured(*own, configuration=configuration, nodes=nodes, **values)
         self.interface = Interface(self.configuration.shared)
+        require_parameters(self.configuration)
         self._composition = Composition(self.configuration, domain_id=self._domain_id)
         self.nodes: dict[str, Any] = self._composition.nodes
         self.context, self.executor = self._composition.context, self._composition.executor
@@ -216,11 +218,11 @@ class RunningArm:
         Raises
         ------
         ArmFault
-            where the driver has a fault that the test does not expect.
+            where the driver has a fault, or a node refuses a message, and the test does not expect it.
         AssertionError
             where the condition does not hold within `seconds` of the arm's time.
         """
-        self._spin(condition, seconds, self._require_no_fault)
+        self._spin(condition, seconds, self._look)
 
     def _spin(self, condition: Callable[[], Any], seconds: float, look: Callable[[], None]) -> None:
         self._require_start()
@@ -247,6 +249,7 @@ class RunningArm:
         """Spin for a time of the arm, s."""
         end = self.stamp + round(seconds * SECOND)
         self.run_until(lambda: self.stamp >= end, seconds + 1.0)
+        self._look()
 
     def run_until_fault(self, seconds: float = TEST_LIMITS.arm_time) -> str:
         """Spin until the driver has a fault, which the test expects; returns it."""
@@ -254,12 +257,26 @@ class RunningArm:
         self.fault = self._present_fault()
         return self.fault
 
+    def run_until_refused(self, topic: str, seconds: float = TEST_LIMITS.arm_time) -> str:
+        """Spin until a node refuses a message of a topic, which the test expects; returns the node and its reason."""
+        self._expected.add(topic)
+        self._spin(lambda: topic in self._refusals(), seconds, self._look)
+        return self._refusals()[topic]
+
+    def _refusals(self) -> dict[str, str]:
+        """The node that refused a message last and its reason, by topic."""
+        found = ((name, node.health.refused) for name, node in self.nodes.items() if hasattr(node, "health"))
+        return {topic: f"{name}: {reason}" for name, refused in found for topic, reason in refused.items()}
+
     def _present_fault(self) -> str:
         return str(self._driver.safety.fault) if self._driver else ""
 
-    def _require_no_fault(self) -> None:
+    def _look(self) -> None:
         if (fault := self._present_fault()) not in ("", self.fault):
             raise ArmFault(fault)
+        for topic, refusal in self._refusals().items():
+            if topic not in self._expected:
+                raise ArmFault(f"{topic} is refused by {refusal}")
 
     def call(self, service: str, switch: bool | None = None) -> Any:
         """The answer of a service of a node, as ``call("driver/enable", True)``; it has `success` and `message`."""

@@ -42,6 +42,10 @@ class Damping:
         return {"joint_velocity_command": TORQUE, "joint_effort_command": State([], [], efforts)}
 
 
+class Named(Damping):
+    name = "force_loop"
+
+
 class Raising(Damping):
     name, parameters = "raising", Nothing
 
@@ -96,8 +100,10 @@ def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_refuses_it(
     arm.run(1.0)
     value = arm.value(topic, **fields)
     arm.publisher(topic).publish(encoder(BY_NAME[topic], arm.configuration.shared)(1_000_000, value))
+    refusal = arm.run_until_refused(topic if taker == "force_loop" else topic.replace("joint", "motor"))
+    assert refusal.startswith(f"{taker}: ")
+    assert text in refusal
     arm.run_until(lambda: arm.status(taker).level is Level.WARN)
-    assert text in arm.status(taker).message
     assert topic.removeprefix("joint") in arm.status(taker).facts["refused"]
 
 
@@ -117,6 +123,10 @@ def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     with pytest.raises(ArmFault, match="emergency stop"):
         arm.run(0.1)
     assert arm.run_until_fault() == "emergency stop"
+    arm.send("sim/disturbance", frame="outer_lnk", force=(0.0, 1.0, 0.0))
+    with pytest.raises(ArmFault, match="sim/disturbance is refused by driver: .*outer_lnk"):
+        arm.run(0.1)
+    assert "outer_lnk" in arm.run_until_refused("sim/disturbance")
     arm.run(0.1)
     assert (arm.status("driver").level, arm.status("driver").fault) == (Level.ERROR, "emergency stop")
 
@@ -137,6 +147,7 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
         ({"driver": {"watchdogg": 1.0}}, "did you mean"),
         ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
         ({"timing": {"period": -1.0}}, "period"),
+        ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
     ],
 )
 def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text: str, arm: RunningArm) -> None:

@@ -145,10 +145,11 @@ STEP = "\n    def step(self, inputs): ...\nclass Mine: ...\n"
 LOOP = 'from test_own_controller import Echo\nclass Mine(Echo): name = "velocity_loop"\n'
 NO_NODES = [
     ("gravitation", "", "no node is named 'gravitation'; nodes: driver, transform"),
+    ("wam_control.velocity.gravity_node:Gravity", "", "has no class 'Gravity'; did you mean 'GravityNode'\\? it has"),
     ("no_such_package:Class", "", "check that 'no_such_package' is installed or on PYTHONPATH"),
     ("impedance:ImpedanceParameters", "", "is no node: name and parameters"),
     ("broken_module:Any", "gain = 1 +\n", "node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"),
-    ("my_loop:Mine", LOOP, "unknown .* of the packaged node 'velocity_loop': give it another name"),
+    ("my_loop:Mine", LOOP, "of the packaged node 'velocity_loop': give it another name; .*unknown"),
     # the faulty one, though another class of the module is configured
     ("no_outputs:Mine", f'{IMPORTS}@reaction(Input("q")){STEP}', r"'no_outputs:Mine' .* TypeError: .*no_outputs\.py:3"),
     ("odd:Mine", f'{IMPORTS}@reaction(Input("q", "p"), outputs=()){STEP}', r"'odd:Mine' .* TypeError: .*odd\.py:3"),

@@ -158,7 +158,9 @@ def _set(given: argparse.Namespace, stack: StackClient) -> int:
     if not reply.success and name not in stack.live(node, values):
         chosen = f"{key} is chosen at the start and cannot change while the node runs"
         return _stated([reply._replace(message=f"{chosen}; 'wam call get {node}' lists those that can")])
-    return _stated([reply._replace(message=reply.message or f"{key}={value}")])
+    if reply.success:
+        reply = reply._replace(message="; ".join(filter(None, (f"{key}={value}", reply.message))))
+    return _stated([reply])
 
 
 def _like(value: Any, like: Any, name: str) -> Any:

@@ -153,6 +153,11 @@ class ForceLoop:
         return self._supervision.watch
 
     @property
+    def lowered(self) -> str:
+        """Which parameters the guard has lowered, and to what; '' where none."""
+        return self._supervision.lowered
+
+    @property
     def report(self) -> Report:
         """The guard's report; a new object where it has changed."""
         return self._supervision.report

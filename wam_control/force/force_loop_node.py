@@ -188,6 +188,11 @@ class ForceLoopNode:
         """What the guard reports of the parameters in use."""
         return self._loop.report
 
+    @property
+    def lowered(self) -> str:
+        """What applies in place of parameters that the guard does not accept; '' where it accepts all."""
+        return self._loop.lowered
+
     def diagnostics(self) -> dict[str, str]:
         """Why the estimated contact position is not used."""
         return {"estimated contact position not used": self._loop.fallback or "-"}

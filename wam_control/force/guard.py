@@ -52,6 +52,7 @@ class Supervision:
     force_law, torque_law : laws in force.
     assessment : what the guard finds; None where it is off or nothing is fed back.
     watch : what the guard does while the arm moves; None with the assessment.
+    lowered : which parameters the guard has lowered, and to what; '' where none.
     report : the guard's report; a new object where it has changed.
 
     Raises
@@ -72,7 +73,7 @@ class Supervision:
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
         self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, self._joints)
-        self._lowered = _lowered(parameters, self.parameters)
+        self.lowered = _lowered(parameters, self.parameters)
         self._report()
 
     def _judge(self, postures: Sequence[tuple[float, ...]]) -> None:
@@ -122,7 +123,7 @@ class Supervision:
 
     def _report(self) -> None:
         own = self.parameters
-        self.report = report(self.assessment, self.watch, own.guard.mode, own.mode == "joint_torque", self._lowered)
+        self.report = report(self.assessment, self.watch, own.guard.mode, own.mode == "joint_torque", self.lowered)
 
     def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
         """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
