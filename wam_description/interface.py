@@ -144,7 +144,9 @@ class Interface:
         self.declarations: dict[str, Declaration] = {}
         for one in found:
             if one.name in self.declarations:
-                raise ParameterError(f"two nodes of the configuration are named '{one.name}'; list one of them, or rename your own")
+                raise ParameterError(
+                    f"two nodes of the configuration are named '{one.name}'; list one of them, or rename your own"
+                )
             node = replaced.pop(one.name, None)
             self.declarations[one.name] = one if node is None else declaration(node)._replace(name=one.name)
         for name, node in replaced.items():

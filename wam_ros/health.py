@@ -14,7 +14,7 @@ from wam_description.event import Event, Level, fault
 from wam_description.event_text import sentence
 from wam_description.parameters import listed
 from wam_description.signals import NodeStatus
-from wam_description.status import AWAITED, BUSY, CHANGES, HELD_UP, diagnosed_name, with_refused
+from wam_description.status import AWAITED, BUSY, CHANGES, HELD_UP, REFUSED, diagnosed_name, with_refused
 from wam_description.topics import STATUS
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS, LongStep
@@ -180,6 +180,8 @@ class Health:
         self.counts[REFUSED_ON + topic] += 1
         self.refused[topic] = reason
         log, text = self._node.get_logger(), f"{topic}: refused: {printable(reason, NODE_LIMITS.reason_length)}"
+        if topic in self._plain.facts.get(REFUSED, "").split(", "):
+            return  # the node states it itself
         if is_reported:
             log.warning(text, throttle_duration_sec=NODE_LIMITS.log_period)
         elif topic not in self.problems:

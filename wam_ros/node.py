@@ -24,6 +24,7 @@ from wam_description.event_text import sentence
 from wam_description.interface import Feed, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import NodeStatus
+from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
@@ -59,6 +60,7 @@ class AdaptedNode(StackNode):
         self._worked = 0  # stamp of the last step, ns
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
         self._refused: dict[str, int] = {}
+        self._reported: set[tuple[Any, ...]] = set()  # subjects of the newest status
         self._since, self._is_enabled = 0, False
         self._requests = RequestQueue(self, self._take_refusal)
         self._follower = self._follow_parameters()
@@ -173,19 +175,19 @@ class AdaptedNode(StackNode):
             self._watch(feed)
 
     def _finish(self, inputs: Inputs, outputs: Outputs) -> None:
-        """Report what the step has refused, make its requests, then publish what it returned."""
-        refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
-        for topic, why in refusals.items():  # each message once
-            stamp = inputs.stamp_of(topic)
-            if self._refused.get(topic) != stamp:
-                self.health.refuse(topic, why if isinstance(why, str) else sentence(why), is_reported=True)
-            self._refused[topic] = stamp
+        """Make the requests of the step, then publish what it returned; report what it has refused."""
         requests: list[Request] = getattr(self.node, "requests", [])
         if requests or not self._requests.is_idle:
             self._requests.add([*requests], lambda: self._publish(inputs.stamp, outputs))
             requests.clear()
         else:
             self._publish(inputs.stamp, outputs)
+        refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
+        for topic, why in refusals.items():  # each message once
+            stamp = inputs.stamp_of(topic)
+            if self._refused.get(topic) != stamp:
+                self.health.refuse(topic, why if isinstance(why, str) else sentence(why), is_reported=True)
+            self._refused[topic] = stamp
 
     def _publish(self, stamp: int, outputs: Outputs) -> None:
         for topic, value in outputs.items():
@@ -200,10 +202,14 @@ class AdaptedNode(StackNode):
 
     def _set_status(self, stamp: int, status: NodeStatus) -> None:
         self.health.publish(status)
+        before = self._reported  # what only changes in its numbers is reported once
+        self._reported = {event.subject for event in status.events} or {(status.level,)}
         if status.level is Level.ERROR:
             self.get_logger().error(status.message)
         elif status.level is Level.WARN:
-            self.get_logger().warning(status.message)
+            if not self._reported <= before:
+                refused = f"{status.facts[REFUSED]}: refused: " if REFUSED in status.facts else ""
+                self.get_logger().warning(refused + status.message)
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
 

@@ -17,8 +17,9 @@ from sensor_msgs.msg import JointState
 from wam_cli.commands.conform import driver_alone, on_bus
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
-from wam_description.event import Event
+from wam_description.event import Event, Level
 from wam_description.signals import Answer, State
+from wam_driver.bus.safety_module import SafetyMode
 from wam_ros import conformance
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_bench import DriverBench
@@ -124,6 +125,35 @@ def test_the_driver_of_a_real_arm_keeps_the_contract_on_a_simulated_bus(
 ) -> None:
     loaded = on_bus(Configuration.load(packaged(f"barrett-wam{joints}-bus")), f"simulated:{firmware}")
     assert wrong(Bench(ros, tmp_path, driver_alone(loaded))) == []
+
+
+def test_the_driver_of_a_real_arm_states_what_a_person_has_to_do_and_which_fault_there_is(
+    ros: Network, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    loaded = on_bus(Configuration.load(packaged("barrett-wam4-bus")), "simulated:200")
+    driver = Bench(ros, tmp_path, driver_alone(loaded)).driver
+    bus = driver.hardware._line
+    bus.is_attended = False
+
+    def wait_for(text: str, level: Level) -> None:
+        ros.wait(lambda: text in driver.health.status.message and driver.health.status.level is level, what=text)
+
+    bus.switch(SafetyMode.ESTOP)
+    wait_for("press Shift-Idle", Level.WARN)
+    assert not driver.hardware.confirm_home()
+    bus.switch(SafetyMode.IDLE)
+    wait_for("call confirm_home", Level.WARN)
+    assert "put the arm at its home pose" in driver.enable().message
+    assert driver.hardware.confirm_home()
+    wait_for("press Shift-Activate", Level.WARN)
+    bus.switch(SafetyMode.ACTIVE)
+    ros.wait(lambda: not driver.unready)
+    bus.on_line = lambda frame: [] if frame.sender == 2 else [frame]
+    wait_for("motor controller 2 sends no position", Level.ERROR)
+    console = capfd.readouterr().err
+    assert "fault, only the windings of the motors brake, and the arm sinks; when its cause is gone: wam" in console
+    assert "brakes" not in console + driver.brake().message + driver.estop().message
+    assert console.rindex("Shift-Activate") < console.rindex("sends no position"), "not while a fault is latched"
 
 
 @pytest.mark.slow

@@ -151,11 +151,12 @@ class ForceLoopNode:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, events = self._loop.report, self._loop.events
         refusals = self.refusals
-        commanded: tuple[str, ...] = ()
+        commanded = ""
         if refusals or any(event.holds for event in events):  # of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
-            commanded = tuple(map(brief, values))
+            unit = " N" if command and not (torque or task) else ""
+            commanded = f"; commanded: {', '.join(map(brief, values))}{unit}" if values else ""
         subjects = tuple(event.subject for event in (*events, *refusals.values()))
         present = report, subjects, self._loop.is_advised, commanded
         if present == self._reported:
@@ -164,7 +165,7 @@ class ForceLoopNode:
         found = {event.subject: event for event in (*events, *refusals.values())}
         events = tuple(sorted(found.values(), key=lambda event: (not event.holds, event.code is not Code.REFUSED)))
         level = Level.WARN if report.is_warning or events else Level.OK
-        message = sentences(events) or report.message
+        message = sentences(events) + commanded or report.message
         facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
         return {"status": NodeStatus(level, message, facts=facts, events=events)}
 
