@@ -27,6 +27,7 @@ COMPILED = (
     "wam_control/contact/contact_inference.py",
     "wam_control/contact/contact_table.py",
     "wam_control/contact/error_effects.py",
+    "wam_control/contact/motor_side.py",
     "wam_control/force/axes.py",
     "wam_control/force/belief.py",
     "wam_control/force/command_run.py",

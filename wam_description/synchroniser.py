@@ -361,10 +361,9 @@ class Synchroniser:
                 self._lacks = group, group.cause(stamp), min([each.cause(stamp) for each in self._groups])
                 return None
         inputs = Inputs()
-        origins: list[Origin] = []
+        origins = [group.origin for group in self._groups]
         for group in self._groups:
             inputs.update(group.found)
-            origins.append(group.origin)
         for topic, newest in self._newest.items():
             if (found := newest.taken(stamp)) is None:
                 inputs[topic] = None

@@ -21,6 +21,7 @@ class TopicValue(NamedTuple):
 
 
 Rows = dict[str, list[TopicValue]]
+SMALLEST_BLOCK, LARGEST_BLOCK = 8, 2048  # messages: what comes in few takes little, what goes on is seldom begun again
 
 
 class Bus:
@@ -96,7 +97,7 @@ _Row = list[Any]  # stamp and numbers of a message
 
 
 class _Kept:
-    """The numbers of the messages of one topic, packed.
+    """The numbers of the messages of one topic, packed into blocks, each of messages of one length and frame.
 
     As objects they would take four times the memory, and drive those in use out of the processor's caches
     (benchmarks/README.md).
@@ -107,29 +108,40 @@ class _Kept:
     is_framed : whether messages have a frame.
     """
 
-    __slots__ = ("_block", "_blocks", "_count", "_frame", "_is_framed", "_pack", "_row")
+    __slots__ = ("_block", "_blocks", "_count", "_end", "_frame", "_is_framed", "_layout", "_pack", "_row")
 
     def __init__(self, row: Callable[[int, Any], _Row], is_framed: bool) -> None:
         self._row, self._is_framed = row, is_framed
         self._blocks: list[tuple[str, Struct, bytearray]] = []
-        self._count = 0
+        self._count = self._end = 0
+        self._block, self._frame = bytearray(), ""
 
     def add(self, stamp: int, value: Any) -> None:
         """Keep the numbers of a message."""
         row = self._row(stamp, value)
         if len(row) != self._count or (self._is_framed and value.frame != self._frame):
-            self._begin(len(row), value.frame if self._is_framed else "")
-        self._block += self._pack(*row)
+            self._close()
+            self._count, self._frame = len(row), value.frame if self._is_framed else ""
+            self._layout = Struct(f"q{self._count - 1}d")
+            self._pack = self._layout.pack_into
+            self._begin(SMALLEST_BLOCK)
+        elif self._end == len(self._block):
+            self._begin(min(2 * len(self._block) // self._layout.size, LARGEST_BLOCK))
+        self._pack(self._block, self._end, *row)
+        self._end += self._layout.size
 
-    def _begin(self, count: int, frame: str) -> None:
-        """Begin a block of messages of another length or frame."""
-        self._count, self._frame = count, frame
-        layout, self._block = Struct(f"q{count - 1}d"), bytearray()
-        self._blocks.append((frame, layout, self._block))
-        self._pack = layout.pack
+    def _begin(self, messages: int) -> None:
+        """Begin a block of so many messages."""
+        self._block, self._end = bytearray(messages * self._layout.size), 0
+        self._blocks.append((self._frame, self._layout, self._block))
+
+    def _close(self) -> None:
+        """Leave off what is empty of the last block."""
+        del self._block[self._end :]
 
     def taken(self) -> list[TopicValue]:
         """The messages since the last call."""
+        self._close()
         blocks, self._blocks, self._count = self._blocks, [], 0
         return [
             TopicValue(stamp, tuple(values), frame)

@@ -181,7 +181,8 @@ class MomentumObserver:
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        self._filters.take(np.concatenate(([*external, *model, *q, *qd, *qdd], signals)), span)
+        present = np.array([*external, *model, *q, *qd, *qdd])
+        self._filters.take(np.concatenate((present, signals)) if friction else present, span)
         self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
@@ -342,5 +343,5 @@ class _Filters:
         """What was filtered with one time constant; the torque of the model without the mean over a cycle."""
         n, filtered = self._n, self._values[which]
         mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
-        residual, _, pose, velocity, acceleration = mean[: 5 * n].reshape(5, n)
-        return FilteredMotion(residual, filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])
+        pose, velocity, acceleration = mean[2 * n : 3 * n], mean[3 * n : 4 * n], mean[4 * n : 5 * n]
+        return FilteredMotion(mean[:n], filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])
