@@ -5,20 +5,10 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from wam_bag.metadata import INFINITE
+from wam_bag.metadata import offered
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-QOS = {
-    "history": "keep_last",
-    "depth": 7,
-    "reliability": "reliable",
-    "durability": "transient_local",
-    "deadline": INFINITE,
-    "lifespan": INFINITE,
-    "liveliness": "automatic",
-    "liveliness_lease_duration": INFINITE,
-    "avoid_ros_namespace_conventions": False,
-}
+QOS = offered(7, True)
 
 
 def header(stamp: int, frame: str = "") -> Any:

@@ -13,7 +13,7 @@ Messages:
 
 - `columns`: the columns of each message type; `arrays`: their types. `point_clouds`: points of PointCloud2 as a table.
 - `message_groups`: messages of equal layout decoded together. `cdr`: the codec; `value_messages`: one value each, fast.
-- `message_text`: fields of a type from its definition. `definitions`: as ROS installs them, or of `messages.json`.
+- `message_text`: fields of a type from its definition. `definitions`: those of `messages.json`.
 
 Files:
 

@@ -23,50 +23,14 @@ from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
 from wam_bag.errors import RecordingError, command
 from wam_bag.mcap_writer import FAST, McapWriter
-from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, described_topic, write_metadata
+from wam_bag.metadata import LIBRARY, FileSummary, bag_information, described_topic, write_metadata
 
-__all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "policies", "release"]
+__all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "release"]
 
 CHUNK_SIZE: Final = 1024 * 1024  # bytes; the arm fills half of it in half a second, and it compresses to a tenth
 FLUSH_PERIOD: Final = 0.5  # s; a killed recorder loses at most this and one timer period
 RESERVE: Final = ".reserved"  # file that keeps space for the end of the bag
 RESERVED: Final = 8 * 2**20  # bytes of it; an hour of the arm needs two for its indexes
-POLICIES: Final = (
-    "history", "depth", "reliability", "durability", "deadline", "lifespan", "liveliness",
-    "liveliness_lease_duration", "avoid_ros_namespace_conventions",
-)  # fmt: skip
-
-Policies = Mapping[str, Any]
-
-
-def policies(qos: Any) -> Policies:
-    """The nine QoS policies as rosbag2 (version 9) writes them.
-
-    Parameters
-    ----------
-    qos : an rclpy QoSProfile, or a mapping with exactly the nine policies, which is used unchanged.
-    """
-    if isinstance(qos, Mapping):
-        if set(qos) != set(POLICIES):
-            raise ValueError(f"QoS has the policies {sorted(qos)}; it needs exactly {sorted(POLICIES)}")
-        return qos
-
-    def duration(value: Any) -> dict[str, int]:
-        sec, nsec = divmod(value.nanoseconds, 10**9)
-        return {"sec": sec, "nsec": nsec} if value.nanoseconds else dict(INFINITE)
-
-    liveliness = qos.liveliness.name.lower()
-    return {
-        "history": qos.history.name.lower(),
-        "depth": qos.depth,
-        "reliability": qos.reliability.name.lower(),
-        "durability": qos.durability.name.lower(),
-        "deadline": duration(qos.deadline),
-        "lifespan": duration(qos.lifespan),
-        "liveliness": "automatic" if liveliness == "system_default" else liveliness,
-        "liveliness_lease_duration": duration(qos.liveliness_lease_duration),
-        "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
-    }
 
 
 class Split(NamedTuple):
@@ -156,16 +120,16 @@ class BagWriter:
     ) -> None:
         self.close()
 
-    def add_topic(self, name: str, kind: str, qos: Any) -> None:
+    def add_topic(self, name: str, kind: str, qos: Mapping[str, Any]) -> None:
         """Define a topic; once, before its first message.
 
         Parameters
         ----------
         name : full topic name, with its namespace.
-        kind : type, ``package/msg/Type``; its definition must be installed.
-        qos : what the publishers offer, as `policies` takes it.
+        kind : type, ``package/msg/Type``, one of `definitions`.
+        qos : policies that the publishers offer, see `metadata.offered`.
         """
-        self._topics.append(described_topic(name, kind, "cdr", [policies(qos)], type_hash(kind)))
+        self._topics.append(described_topic(name, kind, "cdr", [qos], type_hash(kind)))
         self._define(self._topics[-1])
         self._lengths[name] = ExactLength(kind)
 

@@ -260,7 +260,7 @@ def encoded(kind: str, value: Sequence[Any]) -> bytes:
 
 
 def _add_message(body: bytearray, kind: str, value: Sequence[Any]) -> None:
-    for field, part in zip(definition(kind).fields, value, strict=True):
+    for field, part in zip(definition(kind), value, strict=True):
         if field.length is None:
             _add_one(body, field.type, part)
             continue
@@ -359,10 +359,10 @@ def stamp_reader(name: str) -> Callable[[bytes], int | None]:
     The stamp is the one the message begins with, or that of the first element if it begins with a
     sequence of stamped messages (MarkerArray).  The function returns None if there is none, or too few bytes.
     """
-    first = definition(name).fields[0]
+    first = definition(name)[0]
     if first.type in _STAMPS and first.length is None:
         return first_stamp
-    if first.length == 0 and "/" in first.type and definition(first.type).fields[0].type in _STAMPS:
+    if first.length == 0 and "/" in first.type and definition(first.type)[0].type in _STAMPS:
         return _element_stamp
     return lambda data: None
 

@@ -13,11 +13,15 @@ from wam_bag import safe_yaml
 
 LIBRARY: Final = "wam_stack"  # that writes the files
 INFINITE: Final = {"sec": 9223372036, "nsec": 854775807}
-_QOS = {
-    "history": "keep_last", "depth": 1000, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
-    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
-    "avoid_ros_namespace_conventions": False,
-}  # fmt: skip
+
+
+def offered(depth: int = 1000, is_latched: bool = False) -> dict[str, Any]:
+    """The QoS policies of a reliable publisher, as rosbag2 (version 9) writes them."""
+    return {
+        "history": "keep_last", "depth": depth, "reliability": "reliable",
+        "durability": "transient_local" if is_latched else "volatile", "deadline": INFINITE, "lifespan": INFINITE,
+        "liveliness": "automatic", "liveliness_lease_duration": INFINITE, "avoid_ros_namespace_conventions": False,
+    }  # fmt: skip
 
 
 class FileSummary(NamedTuple):
@@ -76,18 +80,18 @@ def write_metadata(path: Path, information: Mapping[str, Any]) -> None:
 
 def topic_information(channel: Channel, schema: Schema) -> dict[str, Any]:
     """One topic in metadata.yaml, from its records in a file."""
-    offered = profiles(channel.metadata.get("offered_qos_profiles", ""))
+    policies = profiles(channel.metadata.get("offered_qos_profiles", ""))
     digest = channel.metadata.get("topic_type_hash", "")
-    return described_topic(channel.topic, schema.name, channel.message_encoding, offered, digest)
+    return described_topic(channel.topic, schema.name, channel.message_encoding, policies, digest)
 
 
-def described_topic(name: str, kind: str, encoding: str, offered: Any, digest: str) -> dict[str, Any]:
+def described_topic(name: str, kind: str, encoding: str, policies: Any, digest: str) -> dict[str, Any]:
     """One topic in metadata.yaml: its type, with the policies that its publishers offer and its hash."""
     return {
         "name": name,
         "type": kind,
         "serialization_format": encoding,
-        "offered_qos_profiles": offered,
+        "offered_qos_profiles": policies,
         "type_description_hash": digest,
     }
 
@@ -95,5 +99,5 @@ def described_topic(name: str, kind: str, encoding: str, offered: Any, digest: s
 def profiles(text: str) -> Any:
     """QoS policies that a topic's publishers offer; defaults if there are none or they cannot be read."""
     with contextlib.suppress(yaml.YAMLError):
-        return safe_yaml.load(text) or [_QOS]  # readers drop a topic that offers nothing
-    return [_QOS]
+        return safe_yaml.load(text) or [offered()]  # readers drop a topic that offers nothing
+    return [offered()]

@@ -24,6 +24,7 @@ RATES: Final = ("inner", "outer", "display", "latched", "1 Hz")
 SIDES: Final = ("motors", "joints")
 EVERY_NODE: Final = ("status", "/diagnostics")  # published by every node, declared by none
 STATUS: Final = "status"
+DEPTH: Final = 1000  # messages, a second of the inner loop: a late reader loses nothing until then
 
 LINK: Final = "link"  # column with the index of a cover in arm.covers.names
 HYPOTHESIS_COLUMNS: Final = (
@@ -174,6 +175,11 @@ class Topic(NamedTuple):
     def latched(self) -> bool:
         """True where a late subscriber gets the last message (transient local)."""
         return self.rate == "latched"
+
+    @property
+    def depth(self) -> int:
+        """Messages that a publisher keeps for late readers."""
+        return 1 if self.latched else DEPTH
 
     @property
     def is_replayed(self) -> bool:

@@ -10,6 +10,7 @@ from wam_bag.bag_writer import BagWriter, RecordingError
 from wam_bag.cdr import Reading, stamp_reader
 from wam_bag.errors import Damage
 from wam_bag.losses import LOST_AT_END, RECORDING, UNFINISHED, losses
+from wam_bag.metadata import offered
 from wam_bag.printable import printable
 from wam_description.status import diagnosed_name
 from wam_description.topics import EVERY_NODE, Topic
@@ -166,7 +167,6 @@ class Recorder:
         sends on /diagnostics has the newest stamp of all.  Before its first it is
         0 in a recording from the start of the run; in one that begins later it is the first stamp of
         all, and no latched message, which may be older, has an earlier one.
-    qos : what each topic's publishers offer, by full name.
     writers : finds the present publishers of a topic: the node of each, by its identity.
     namespace : of the arm, by which its nodes are named in /diagnostics.
     """
@@ -176,7 +176,6 @@ class Recorder:
         bag: BagWriter,
         topics: Mapping[str, Topic],
         mode: str,
-        qos: Mapping[str, object],
         writers: Callable[[str], Mapping[str, str]],
         namespace: str,
     ) -> None:
@@ -190,7 +189,7 @@ class Recorder:
         self._held: list[tuple[_Channel, str, bytes, int]] | None = []  # until its start is known
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
-            bag.add_topic(name, topic.type, qos[name])
+            bag.add_topic(name, topic.type, offered(topic.depth, topic.latched))
             self._channels[name] = _Channel(topic, name, partial(writers, name), diagnosed_name(namespace, ""))
         if not self._lockstep or all(topic.latched for topic in topics.values()):
             self._held = None

@@ -13,7 +13,7 @@ from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, values
 from wam_description.signals import NodeStatus
 from wam_description.status import diagnosed_name
-from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
+from wam_description.topics import BY_NAME, DEPTH, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text
 from wam_ros.health import ENDED, NODE, PUBLISHED, READY
 from wam_ros.limits import RECORDER_LIMITS
@@ -24,7 +24,7 @@ from wam_ros.recorded_stack import RecordedStack
 from wam_ros.recorder import Recorder
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import DEPTH, DIAGNOSTICS, listening, qos, topic_name
+from wam_ros.topics import DIAGNOSTICS, listening, qos, topic_name
 from wam_ros.wire import deserialized
 
 
@@ -46,9 +46,8 @@ class RecorderNode(TolerantNode):
         interface = Interface(shared)
         topics = {self.resolve_topic_name(topic_name(self, topic)): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
-        offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
-        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._writers, self.get_namespace())
+        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, self._writers, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
         self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;

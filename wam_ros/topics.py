@@ -7,9 +7,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
-from wam_description.topics import Topic
+from wam_description.topics import DEPTH, Topic
 
-DEPTH = 1000  # a second of the inner loop: a late reader loses nothing until then
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 DIAGNOSTICS = "/diagnostics"
 CLOCK = "/clock"
@@ -31,7 +30,7 @@ def qos(topic: Topic) -> QoSProfile:
     return QoSProfile(
         reliability=ReliabilityPolicy.RELIABLE,
         history=HistoryPolicy.KEEP_LAST,
-        depth=1 if topic.latched else DEPTH,
+        depth=topic.depth,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE,
     )
 

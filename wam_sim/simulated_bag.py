@@ -1,7 +1,7 @@
 """A simulation recorded into a bag, as the recorder node does it in lockstep, without ROS."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +10,7 @@ from wam_bag.bag_writer import BagWriter
 from wam_bag.cdr import encoded
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_bag.losses import RECORDING
-from wam_bag.metadata import INFINITE
+from wam_bag.metadata import offered
 from wam_bag.value_messages import TIME, Encode, encoder
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Shared
@@ -19,13 +19,12 @@ from wam_description.defects import owners
 from wam_description.interface import Interface, declared
 from wam_description.signals import NodeStatus
 from wam_description.status import pairs
-from wam_description.topics import STATUS, Topic
+from wam_description.topics import STATUS
 from wam_description.urdf import urdf
 from wam_description.yaml_text import parameter_text
 from wam_sim.simulation import Simulation
 
 DESCRIPTION: Final = "robot_description"
-DEPTH: Final = 1000
 PLAYER: Final = "scenario"  # the node
 
 
@@ -88,11 +87,11 @@ class _Recording:
         for topic in interface.topics.values():
             encode = encoder(topic.type, owners(topic, shared.arm), topic.columns)
             if encode is not None and topic.type != TIME and (senders := interface.publishers(topic.name)):
-                bag.add_topic(self._full(topic.name), topic.type, _qos(topic))
+                bag.add_topic(self._full(topic.name), topic.type, offered(topic.depth, topic.latched))
                 if topic.name != DESCRIPTION:
                     simulation.listen(topic.name, partial(self._write_value, topic.name, encode, senders[0]))
         self._status = interface.topics[STATUS]
-        bag.add_topic(self._full(STATUS), self._status.type, _qos(self._status))
+        bag.add_topic(self._full(STATUS), self._status.type, offered(self._status.depth, self._status.latched))
         for node in simulation.nodes:
             simulation.listen(STATUS, partial(self._write_status, node), node)
         self._write(DESCRIPTION, encoded(interface.topics[DESCRIPTION].type, [urdf(shared.arm)]), 0, "driver")
@@ -136,18 +135,3 @@ def _parameters(configuration: Configuration, namespace: str) -> str:
     own = {name: flat for name, flat in configuration.sections.items() if name in nodes}
     shared = configuration.sections[SHARED]
     return parameter_text({f"/{namespace}/{name}": {**shared, **flat} for name, flat in own.items()})
-
-
-def _qos(topic: Topic) -> Mapping[str, Any]:
-    """The policies that the ROS nodes offer."""
-    return {
-        "history": "keep_last",
-        "depth": 1 if topic.latched else DEPTH,
-        "reliability": "reliable",
-        "durability": "transient_local" if topic.latched else "volatile",
-        "deadline": dict(INFINITE),
-        "lifespan": dict(INFINITE),
-        "liveliness": "automatic",
-        "liveliness_lease_duration": dict(INFINITE),
-        "avoid_ros_namespace_conventions": False,
-    }

@@ -24,17 +24,13 @@ from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
 from wam_bag.losses import losses
-from wam_bag.metadata import INFINITE
+from wam_bag.metadata import offered
 from wam_bag.repair import repair
 from wam_cli.commands.bag import described, stated
 
 ROOT = Path(__file__).parents[2]
 JOINTS = "sensor_msgs/msg/JointState"
-QOS = {
-    "history": "keep_last", "depth": 7, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
-    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
-    "avoid_ros_namespace_conventions": False,
-}  # fmt: skip
+QOS = offered(7)
 
 
 def record(path: Path, samples: list[Sample], split: Split = WHOLE) -> BagWriter:

@@ -11,11 +11,10 @@ from sample_messages import STORE, joint_state, status
 
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
+from wam_bag.metadata import offered
 from wam_cli.main import main
 from wam_description.configuration import SHARED, Configuration, packaged
-from wam_description.topics import BY_NAME
 from wam_description.yaml_text import parameter_text
-from wam_ros.topics import qos
 from wam_sim.recorded_parameters import recorded_parameters
 
 MESSAGES = {"/left": 30, "/right": 40}
@@ -117,7 +116,7 @@ def test_bags_of_two_arms_that_another_tool_merged_keep_what_each_had(tmp_path: 
     for namespace, mass in (("left", 1.0), ("right", 2.0)):
         with BagWriter(tmp_path / namespace) as bag:
             own = {**sections[SHARED], **sections["driver"], "arm.payload": mass}
-            bag.add_topic(f"/{namespace}/contact/in_contact", "std_msgs/msg/Bool", qos(BY_NAME["contact/in_contact"]))
+            bag.add_topic(f"/{namespace}/contact/in_contact", "std_msgs/msg/Bool", offered())
             bag.write(f"/{namespace}/contact/in_contact", b"\0\1\0\0\1", 1, 1, 1)
             bag.attach("parameters.yaml", "application/yaml", parameter_text({f"/{namespace}/driver": own}).encode())
             bag.metadata("recording", {"mode": "lockstep", f"/{namespace}/contact/in_contact driver dropped": "3"})

@@ -34,12 +34,11 @@ ARROWS = {
 # package -> all that it may import of others; the rest take what they need
 DEPENDENCIES = {
     "wam_theory": {"numpy"},
-    # ament_index_python where there is ROS, pandas where somebody asks for a DataFrame, rosbags for ROS 1 and SQLite
-    "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "ament_index_python", "pandas", "rosbags"},
+    # pandas where somebody asks for a DataFrame, rosbags for ROS 1 and SQLite
+    "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "pandas", "rosbags"},
 }
 KNOW_ROS = ("wam_ros", "wam_cli", "wam_live", "wam_studies")
 WITHOUT_CLOCK = ("wam_theory", "wam_description", "wam_driver", "wam_control")
-# ament_index_python is left out: it lists what is installed, in plain Python; wam_bag looks up message definitions
 ROS = {"builtin_interfaces", "launch", "launch_ros", "rcl_interfaces", "rclpy", "std_srvs"}
 CLOCKS = {"time", "datetime"}
 BANNED_NAMES = {"base", "common", "helper", "helpers", "manager", "managers", "util", "utils"}

@@ -22,14 +22,14 @@ from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State, Wrench
-from wam_description.topics import BY_NAME, TOPICS
+from wam_description.topics import BY_NAME, DEPTH, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.node import make_node
 from wam_ros.outlets import COPIED, copy_name
 from wam_ros.testing import RunningArm, playing
-from wam_ros.topics import DEPTH, qos, stamp_of
+from wam_ros.topics import qos, stamp_of
 from wam_ros.wire import encoder
 from wam_studies.faults.answered_clock import AnsweredClock
 

@@ -91,8 +91,7 @@ def sending(ros: Any, count: int, node: RecorderNode | None = None, step: int = 
 def machine(folder: Path, *topics: str, mode: str = "lockstep", arm: str = "/wam") -> Recorder:
     """A recorder of topics, by their full names, without ROS."""
     rows = {name: BY_NAME[name if name in BY_NAME else name.removeprefix("/wam/")] for name in topics}
-    offered = {name: qos(row) for name, row in rows.items()}
-    return Recorder(BagWriter(folder / "bag"), rows, mode, offered, lambda name: {"1": "driver"}, arm)
+    return Recorder(BagWriter(folder / "bag"), rows, mode, lambda name: {"1": "driver"}, arm)
 
 
 def listening(ros: Any) -> list[Any]:

@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import BagWriter
-from wam_bag.metadata import INFINITE
+from wam_bag.metadata import offered
 from wam_cli import main as cli
 from wam_cli.commands.replay import other_values
 from wam_description.configuration import Configuration, packaged
@@ -42,11 +42,7 @@ STEPS = {
         {"name": "press", "seconds": 0.05, "force": {"frame": "outer_link", "newtons": [0.0, -5.0, 0.0]}},
     ]
 }
-QOS = {
-    "history": "keep_last", "depth": 7, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
-    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
-    "avoid_ros_namespace_conventions": False,
-}  # fmt: skip
+QOS = offered(7)
 
 
 RECORDED: list[Path] = []
