@@ -242,7 +242,7 @@ TOPICS: Final = (
     _joints(
         "joint_torque_command",
         "outer",
-        "joint torques commanded by your program, N m; used only with the parameter `mode: joint_torque` of force_loop",
+        "joint torques commanded by your program, N m; they take the place of force and posture",
     ),
     Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero ends it"),
     Topic(

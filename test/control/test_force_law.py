@@ -126,7 +126,7 @@ def test_another_frame_begins_without_the_answers_still_delayed() -> None:
 
 
 def test_joint_torques_begin_without_the_rate_of_an_earlier_measurement() -> None:
-    own = replace(OWN, mode="joint_torque", torque_gain=(0.0,), torque_proportional_gain=(1e-4,))
+    own = replace(OWN, torque_gain=(0.0,), torque_proportional_gain=(1e-4,), force_filter=0.0)
     speeds = []
     for pause, force in (([1.0] * 4, 2.0), (None, 4.0)):
         loop = force_loop(ARM, own)
@@ -192,12 +192,12 @@ def test_a_force_too_small_to_have_a_direction_is_none(newtons: float) -> None:
         assert out == ask(none, World(400.0), down(0.0))
 
 
-def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
-    own = replace(OWN, mode="joint_torque", torque_limit=4.0, force_feedforward=1.0, friction_feedforward=0.0)
-    loop = force_loop(ARM, own)
+def test_a_torque_above_the_limit_is_refused_and_the_arm_holds() -> None:
+    own = replace(OWN, torque_limit=4.0, force_feedforward=1.0, friction_feedforward=0.0)
+    loop, found = force_loop(ARM, own), []
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):
-        out = ask(loop, World(1e-9), None, torque=torque)
-    assert out.effort == [1.0, 2.0, 0.0, 0.0]
+        found.append(ask(loop, World(1e-9), None, torque=torque).effort)
+    assert found == [[1.0, 2.0, 0.0, 0.0], STILL]
     assert "4.5 N m is commanded; allowed: up to torque_limit, 4 N m" in sentence(loop.refusals["joint_torque_command"])
     loop.tune(replace(loop.parameters, torque_limit=5.0))
     assert ask(loop, World(1e-9), None, torque=torque).effort == torque

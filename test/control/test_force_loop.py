@@ -167,7 +167,7 @@ def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> No
 
 
 def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
-    loop = force_loop(ARM, replace(OWN, mode="joint_torque", friction_feedforward=0.0))
+    loop = force_loop(ARM, replace(OWN, friction_feedforward=0.0))
     stiffness, commanded = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
     world = World(1e-9)
     for _ in range(2000):
@@ -257,29 +257,32 @@ def test_a_force_that_ends_leaves_the_arm_where_it_is() -> None:
     assert ask(loop, world, posture=MOVED).velocity == pytest.approx([-0.01 * OWN.posture_gain] * 4)
 
 
-@pytest.mark.parametrize("mode", ["joint_torque", "open_loop"])
-def test_a_posture_in_a_mode_that_follows_none_is_refused_if_the_arm_would_have_to_move(mode: str) -> None:
+UNMOVED: list[tuple[str, Any]] = [("hybrid", [0.0] * 4), ("open_loop", None)]  # mode and torque
+
+
+@pytest.mark.parametrize(("mode", "torque"), UNMOVED)
+def test_a_posture_that_nothing_follows_is_refused_if_the_arm_would_have_to_move(mode: str, torque: Any) -> None:
     for first in (POSE, MOVED):
         loop, world = force_loop(ARM, replace(OWN, mode=mode)), World()
-        ask(loop, world)
+        ask(loop, world, torque=torque)
         for posture in (first, MOVED):
-            assert not any(ask(loop, world, posture=posture).velocity)
+            assert not any(ask(loop, world, posture=posture, torque=torque).velocity)
             assert ("joint_posture_command" in loop.refusals) is (posture is MOVED)
 
 
-@pytest.mark.parametrize("mode", ["joint_torque", "open_loop"])
-def test_a_posture_that_is_set_to_where_the_arm_is_does_not_ask_for_a_motion(mode: str) -> None:
+@pytest.mark.parametrize(("mode", "torque"), UNMOVED)
+def test_a_posture_that_is_set_to_where_the_arm_is_does_not_ask_for_a_motion(mode: str, torque: Any) -> None:
     """As a scenario does after a force, and with the last increment of a motion before a torque."""
     loop = force_loop(ARM, replace(OWN, mode=mode))
     for k, posture in enumerate([*[POSE] * 20, *[[POSE[0] + 0.2, *POSE[1:]]] * 20]):
-        ask(loop, World(q=[POSE[0] + 0.01 * k, *POSE[1:]]), posture=posture)  # turned by the torques
+        world = World(q=[POSE[0] + 0.01 * k, *POSE[1:]])  # turned by the torques
+        ask(loop, world, posture=posture, torque=torque)
         assert "joint_posture_command" not in loop.refusals
 
 
 def test_a_command_that_has_no_effect_is_refused() -> None:
-    loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
+    loop = force_loop(ARM, OWN)
     for given, refused in (
-        ({"posture": POSE, "torque": [1.0, 0.0, 0.0, 0.0]}, set()),
         ({"posture": POSE}, set()),
         ({"posture": MOVED}, {"joint_posture_command"}),
         ({"posture": MOVED}, {"joint_posture_command"}),  # until it ends
@@ -287,11 +290,11 @@ def test_a_command_that_has_no_effect_is_refused() -> None:
         ({"force": 5.0}, {"force_command"}),
         ({"force": 0.0}, set()),
     ):
-        ask(loop, World(), **given)
+        ask(loop, World(), torque=[1.0, 0.0, 0.0, 0.0], **given)
         assert set(loop.refusals) == refused
-    hybrid = force_loop(ARM, OWN)
-    ask(hybrid, World(), torque=[1.0, 0.0, 0.0, 0.0], posture=MOVED)
-    assert set(hybrid.refusals) == {"joint_torque_command"}
+    unmoved = force_loop(ARM, replace(OWN, mode="open_loop"))
+    ask(unmoved, World(), torque=[1.0, 0.0, 0.0, 0.0])
+    assert set(unmoved.refusals) == {"joint_torque_command"}
     for count, refused in ((3, {"force_command"}), (4, {"force_command", "joint_posture_command"})):
         task = TaskCommand("base", tuple(TaskAxis(AxisKind.POSITION, k, value=None) for k in range(count)))
         loop = force_loop(ARM, OWN)
@@ -309,7 +312,7 @@ TIME = np.arange(0.0, 4.0 * LATE * DT, DT)
 
 def reported(torques: np.ndarray, taken: np.ndarray, sd: float = 0.015, **limits: Any) -> list[set[Code]]:
     """Of a joint that stays where it is, in each period, while its commanded and taken torque, N m, are these."""
-    own = replace(limited(settling_time=LATE * DT, **limits), mode="joint_torque")
+    own = limited(settling_time=LATE * DT, **limits)
     loop, found = force_loop(ARM, replace(own, sensing=replace(OWN.sensing, torque_sd=sd))), []
     for torque, external in zip(torques.tolist(), taken.tolist(), strict=True):
         sensors = State(POSE, STILL, np.add(BODY.gravity_torque(POSE), (0.0, external, 0.0, 0.0)).tolist())
@@ -458,7 +461,7 @@ def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() ->
     """Of 0.5 kg at the tool; the arm was elsewhere before, and had no contact."""
     weight = BODY.tool_jacobian(POSE).T @ np.array([0.0, 0.0, -0.5 * 9.81])
     sensing = replace(OWN.sensing, zero_limit=0.5)
-    loop = force_loop(ARM, replace(limited(doubt=1.0), mode="joint_torque", sensing=sensing))
+    loop = force_loop(ARM, replace(limited(doubt=1.0), sensing=sensing))
     sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) - weight).tolist())
     for torque in (None, [0.0, 0.0, 0.0, 2.0]):
         for _ in range(LATE):

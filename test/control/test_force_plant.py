@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from arms import BODY, CONFIGURATION, WAM
 
-from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of
+from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_control.force.task import AxisKind, TaskCommand, joint_axes
 from wam_control.task.scenario import Push, ScenarioStep
@@ -126,7 +126,7 @@ def test_the_guard_counts_a_payload() -> None:
             loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, sensing_of(own)
         )
         contacts = guard.contacts(own.guard.posture, OUTER, 0.28, 0.0)
-        scales.append(min(guard.scales(task_of(own, force_law(own)), contacts)))
+        scales.append(min(guard.scales(task_of(own), contacts)))
     assert abs(scales[1] / scales[0] - 1.0) > 0.1
 
 

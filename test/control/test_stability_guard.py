@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arms import LEVER, changed, one_joint
+from arms import BODY, LEVER, changed, one_joint
 
 from wam_control.force.contact_place import anywhere_sd
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
-from wam_control.force.force_loop_parameters import force_law, task_of, torque_law
+from wam_control.force.force_loop_parameters import task_of
 from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
-from wam_control.force.stability_guard import GuardedContact, GuardedTask, StabilityGuard
+from wam_control.force.sampled_loop import Feedback
+from wam_control.force.stability_guard import GuardedContact, GuardedForces, GuardedTask, StabilityGuard
 from wam_control.velocity.servo_guard import ServoGuard
 from wam_control.velocity.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Servo, Timing
@@ -30,6 +31,9 @@ PACKAGED = WAM.node("force_loop", ForceLoopParameters)
 # the sensors of these tests are those of no arm at rest: no zero
 OWN = replace(PACKAGED, sensing=replace(PACKAGED.sensing, zero_limit=0.0), guard=replace(PACKAGED.guard, mode="refuse"))
 SERVO = WAM.shared.servo
+FREE = replace(
+    OWN.limits, joint_gain=0.0, joint_acceleration=0.0, doubt=1e9, contact_force=1e9, impact=0.0, free_travel=1e3
+)
 Loop = partial(ForceLoop, ARM, SERVO, timing=CLOCK)
 UNSURE = anywhere_sd(ARM.covers, "outer_link", 0.28)
 
@@ -133,16 +137,11 @@ def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_sta
 @pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.3, 0.87])
 def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
-    for make, own, group in (
-        (Loop, OWN, "force"),
-        (Loop, replace(OWN, mode="joint_torque"), "torque"),
-        (bench_loop, guarded(bench(), mode="refuse"), "force"),
-    ):
-        name = f"{group}_gain"
+    for make, own in ((Loop, OWN), (bench_loop, bench())):
         with pytest.raises(ParameterError) as refusal:
-            make(replace(own, **{name: (gain,)}))
-        reported = str(refusal.value).split(f"{name} up to [")[1].split("]")[0]
-        assert make(replace(own, **{name: (float(reported.split(",")[0]),)})).assessment is not None
+            make(replace(own, force_gain=(gain,)))
+        reported = str(refusal.value).split("force_gain up to [")[1].split("]")[0]
+        assert make(replace(own, force_gain=(float(reported.split(",")[0]),))).assessment is not None
 
 
 @pytest.mark.slow
@@ -155,10 +154,23 @@ def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str
 
 @pytest.mark.slow
 def test_a_bad_set_stops_the_loop_at_its_start() -> None:
-    with pytest.raises(ParameterError, match=r"torque_gain .* times the largest linearly stable one"):
-        Loop(replace(OWN, mode="joint_torque", torque_gain=(0.1,)))
-    assert Loop(replace(OWN, mode="joint_torque")).assessment is not None
+    with pytest.raises(ParameterError, match=r"force_gain .* times the largest linearly stable one"):
+        Loop(replace(OWN, force_gain=(9.0,)))
     assert Loop(replace(OWN, mode="open_loop", force_gain=(9.0,))).assessment is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gain", "is_lowered"), [(0.015, False), (1.0, True)])
+def test_gains_of_joint_torques_are_taken_down_before_the_arm_moves(gain: float, is_lowered: bool) -> None:
+    q, velocity = list(OWN.guard.posture), [0.0]
+    state, free = State(q, [0.0] * 4, [1.0] * 4), State(q, [0.0] * 4, BODY.gravity_torque(q).tolist())
+    loop = Loop(replace(OWN, torque_gain=(gain,), torque_error_limit=(1e3,), limits=FREE))
+    while not any(velocity):
+        velocity = loop.step(state, free, NO_CONTACT, None, None, None, [0.0, 1.0, 0.0, 0.0], 0.005).velocity
+    assert loop.watch is not None
+    assert loop.watch.assessed
+    assert (loop.watch.factor < 0.3) is is_lowered
+    assert max(velocity) == pytest.approx(loop.watch.factor * gain, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -266,7 +278,7 @@ def follow(
             [0.0] * len(q),
             ForceCommand(cover, force),
             None,
-            [0.0] * len(q),
+            None,
             0.005,
         )
     assert loop.watch is not None
@@ -312,18 +324,13 @@ def test_gains_without_any_margin_are_followed_where_the_guard_only_warns() -> N
 
 
 def loop_task(loop: ForceLoop) -> GuardedTask:
-    return task_of(loop.parameters, force_law(loop.parameters))
+    return task_of(loop.parameters)
 
 
 def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, float]:
     """Of the command of `follow`."""
     x, y, z = guard.contacts(q, "outer_link", 0.28, UNSURE)[-1].direction
     return -x, -y, -z
-
-
-FREE = replace(
-    OWN.limits, joint_gain=0.0, joint_acceleration=0.0, doubt=1e9, contact_force=1e9, impact=0.0, free_travel=1e3
-)
 
 
 @pytest.mark.slow
@@ -350,14 +357,20 @@ def test_the_margin_of_a_joint_torque_follows_the_square_of_the_contact_position
 
     The loop samples, at 1 kHz, and its servo is not rigid, which takes some per cent.
     """
-    own = bench(mode="joint_torque", feedback="contact_estimate", torque_gain=(0.004,), torque_error_limit=(10.0,))
-    own = guarded(own, contact_stiffness=1500.0, stability_fraction=1.0, feedback_lag=0.0)
+    own = guarded(bench(force_filter=0.0), contact_stiffness=1500.0, stability_fraction=1.0, feedback_lag=0.0)
     guard = StabilityGuard(ROD, Servo((10.0,), (1000.0,)), FAST, own.guard, own.sensing)
-    task = task_of(own, torque_law(own, ROD.joints.names))
-    there, tip = (min(guard.scales(task, guard.contacts([0.0], "tube", at, 0.0))) for at in (place, LEVER))
+    task, one = task_of(own), np.eye(1)
+
+    def margin(at: float) -> float:
+        pressed = [
+            GuardedForces((each,), one, one, np.array([0.004]), np.zeros(1), 0.0 * one)
+            for each in guard.contacts([0.0], "tube", at, 0.0)
+        ]
+        return min(guard.scales(task._replace(feedback=Feedback("contact_estimate", (), 0.0)), pressed))
+
     ktr = 14.0**2 * 8.33
     expected = (1.0 / ktr + 1.0 / (1500.0 * place**2)) / (1.0 / ktr + 1.0 / (1500.0 * LEVER**2))
-    assert there / tip == pytest.approx(expected, rel=0.1)
+    assert margin(place) / margin(LEVER) == pytest.approx(expected, rel=0.1)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 from arms import BODY, CONFIGURATION, SHARED, WAM
 
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
-from wam_control.force.force_loop_parameters import force_law, sensing_of
+from wam_control.force.force_loop_parameters import sensing_of
 from wam_control.force.force_loop_parameters import task_of as task_of_parameters
 from wam_control.force.stability_guard import GuardedForces, GuardedTask, StabilityGuard
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes, line_axes, table_of, task_of
@@ -297,7 +297,7 @@ def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, Guar
 
     world.loop._supervision.factor = factor  # type: ignore[assignment, method-assign]
     world.step(task)
-    return guard, task_of_parameters(GIVEN, force_law(GIVEN)), seen[0]
+    return guard, task_of_parameters(GIVEN), seen[0]
 
 
 def test_the_guard_considers_one_force_of_a_task_as_a_force_alone() -> None:

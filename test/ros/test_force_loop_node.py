@@ -138,7 +138,7 @@ def test_a_trajectory_that_is_refused_is_in_the_status_until_it_ends(ros: Any, t
 
 def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
-    assert feeder.set(mode="joint_torque", force_feedforward=1.0).successful
+    assert feeder.set(force_feedforward=1.0).successful
     heard = Listener(ros, "joint_effort_command").seen["joint_effort_command"]
     row = BY_NAME["joint_torque_command"]
     publisher = feeder.node.create_publisher(message_type(row), row.name, qos(row))

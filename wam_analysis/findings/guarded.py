@@ -61,7 +61,7 @@ def guarded(
     touches = guard.with_lever(GuardedContact(tuple(q), cover, position, 0.0, (x, y, z), HOLD.typical_press))
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
-    found = guard.assess(task_of(loop, law), touches)
+    found = guard.assess(task_of(loop), touches)
     return Guarded(
         found,
         parameters.contact_stiffness,

@@ -1,8 +1,8 @@
 """Which commands the force loop obeys: within the limits; what it does where one ends."""
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Generic, NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from wam_control.force.contact_place import pinned_position, torque_of_position
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -14,8 +14,6 @@ from wam_description.event import Event, refused
 from wam_description.parts import Joints
 from wam_description.signals import ZERO, ForceCommand
 
-T = TypeVar("T")
-
 
 class Commands(NamedTuple):
     """What the force loop has to do in one period.
@@ -23,52 +21,19 @@ class Commands(NamedTuple):
     Attributes
     ----------
     force : commanded force; None where there is none.
-    torque : commanded joint torques of the arm on the world (n,), N m; None where there are none.
     posture : joint angles to hold (n,), rad.
     refusals : why a command of this period is not taken, by topic.
     """
 
     force: ForceCommand | None
-    torque: Sequence[float] | None
     posture: list[float]
     refusals: dict[str, Event]
 
 
-class LastGood(Generic[T]):
-    """The last good command; it is used for a time while newer ones are refused.
-
-    Parameters
-    ----------
-    size : of a command, N or N m.
-    lasting : that time, s.
-
-    Attributes
-    ----------
-    value : the command; None where there is none.
-    """
-
-    def __init__(self, size: Callable[[T | None], float], lasting: float) -> None:
-        self._size, self._lasting = size, lasting
-        self.forget()
-
-    def forget(self) -> None:
-        """There is none."""
-        self.value: T | None = None
-        self._age = 0.0
-
-    def step(self, given: T | None, is_refused: bool, limit: float, dt: float) -> bool:
-        """Take a command, unless it is refused; whether none is left, though one was given."""
-        if not is_refused:
-            self.value, self._age = given, 0.0
-            return False
-        self._age += dt
-        if self._age > self._lasting or self._size(self.value) > limit:
-            self.value = None
-        return self.value is None
-
-
 class CommandAdmission:
     """Admits commands within the limits; instead of others the last good one is used, or the arm stays where it is.
+
+    The last good force is used for a time, unless it is above the limit by now.
 
     Parameters
     ----------
@@ -83,20 +48,19 @@ class CommandAdmission:
 
     def __init__(self, joints: Joints, covers: Covers, command_age: float) -> None:
         self._joints, self._covers = joints, covers
-        self._remains = f"; the last good command remains in use for {command_age:g} s"
-        self._force, self._torque = LastGood(_size, command_age), LastGood(_largest, command_age)
+        self._command_age = command_age
         self.restart([])
 
     def restart(self, q: Sequence[float]) -> None:
         """Hold these joint angles (n,), rad, until another posture is commanded; forget every command."""
-        self._force.forget()
-        self._torque.forget()
+        self._force: ForceCommand | None = None
+        self._age = 0.0
         self._is_moved = self._has_lapsed = self._is_ignored = False
         self.posture = list(q)
 
     def step(
         self,
-        parameters: ForceLoopParameters,
+        own: ForceLoopParameters,
         q: Sequence[float],
         force: ForceCommand | None,
         posture: Sequence[float] | None,
@@ -105,17 +69,19 @@ class CommandAdmission:
         task: TaskCommand | None = None,
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
-        own, pressed = parameters, bool(_size(self._force.value))
+        pressed, refusals = bool(_size(self._force)), dict[str, str]()
         if force is not None and _size(force) < FORCE.smallest_force:
             force = force._replace(force=ZERO)
-        reasons = {
-            "force_command": _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force),
-            "joint_torque_command": _excess(_largest(torque), "torque_limit", own.torque_limit, "N m"),
-        }
-        refusals = {topic: reason + self._remains for topic, reason in reasons.items() if reason}
-        if self._force.step(force, "force_command" in refusals, own.force_limit, dt):
-            force = None
-        self._torque.step(torque, "joint_torque_command" in refusals, own.torque_limit, dt)
+        reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
+        self._age = self._age + dt if reason else 0.0
+        if not reason:
+            self._force = force
+        else:
+            refusals["force_command"] = f"{reason}; the last good command remains in use for {self._command_age:g} s"
+            if self._age > self._command_age or _size(self._force) > own.force_limit:
+                self._force = None
+            if self._force is None:
+                force = None
         if posture is not None and (beyond := self._joints.beyond(posture)):
             refusals["joint_posture_command"] = f"{beyond}; the last good posture remains in use"
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
@@ -129,7 +95,7 @@ class CommandAdmission:
             self.posture = list(q)
         self._is_moved = posture is not None and not self._has_lapsed
         events = {topic: refused(topic, reason) for topic, reason in refusals.items()}
-        return Commands(self._force.value, self._torque.value, self.posture, events)
+        return Commands(self._force, self.posture, events)
 
     def _add_without_effect(
         self,
@@ -141,27 +107,21 @@ class CommandAdmission:
         torque: Sequence[float] | None,
         task: TaskCommand | None,
     ) -> None:
-        """Refuse what is not controlled in this mode, or with this task: a force, a posture that moves, a torque."""
+        """Refuse what has no effect in this mode, or with this task: a force, a posture that moves, a torque."""
         joints = len(self._joints.names)
-        is_of_force, is_of_torque, is_of_posture = mode != "joint_torque", mode == "joint_torque", mode == "hybrid"
-        if task is not None:
-            is_of_force = is_of_torque = False
-            is_of_posture = len(task.axes) < joints
+        is_of_posture = mode == "hybrid" if task is None else len(task.axes) < joints
         self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture, q))
         useless = {
-            "force_command": not is_of_force and bool(_size(force)),
+            "force_command": task is not None and bool(_size(force)),
             "joint_posture_command": self._is_ignored,
-            "joint_torque_command": not is_of_torque and bool(_largest(torque)),
+            "joint_torque_command": torque is not None,
         }
+        reason = f"in the mode {mode}; set force_loop:mode to hybrid, or end the command"
+        if task is not None:
+            reason = f"with a task of {len(task.axes)} axes on {joints} joints; end one of them"
         for topic, is_useless in useless.items():
             if is_useless and topic not in refusals:
-                other = "joint_torque" if topic == "joint_torque_command" else "hybrid"
-                refusals[topic] = (
-                    f"{topic} has no effect in the mode {mode}; set force_loop:mode to {other}, or end the command"
-                    if task is None
-                    else f"{topic} has no effect with a task of {len(task.axes)} axes on {joints} joints; end one of "
-                    "them"
-                )
+                refusals[topic] = f"{topic} has no effect {reason}"
 
     def _moves(self, posture: Sequence[float], q: Sequence[float]) -> bool:
         """Whether a posture is another one than before, and not where the arm is."""
@@ -219,7 +179,3 @@ def _excess(commanded: float, name: str, limit: float, unit: str) -> str:
 
 def _size(command: ForceCommand | None) -> float:
     return math.hypot(*command.force) if command is not None else 0.0
-
-
-def _largest(torque: Sequence[float] | None) -> float:
-    return max(map(abs, torque)) if torque is not None else 0.0

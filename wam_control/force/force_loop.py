@@ -212,7 +212,7 @@ class ForceLoop:
         command : commanded force; None or zero leaves all axes to the posture.  Where a force ends with None, the arm
             stays where it is.
         posture : commanded joint angles (n,), rad; None holds those of the start, or those where a posture ended.
-        torque : commanded joint torques on the world in the joint_torque mode (n,), N m.
+        torque : commanded joint torques on the world (n,), N m: a task with an axis for each joint.
         dt : outer period, s.
         task : takes the place of force and torque; where it ends, the arm stays where it is.
         posture_rate : velocity at which the commanded posture moves (n,), rad/s.
@@ -230,8 +230,10 @@ class ForceLoop:
         is_free, contact = contact is not None and not contact.cover, contact or NO_CONTACT
         is_touched = bool(contact.cover) or self._run.is_touching
         self._measurement.step(own, joints, sensors, external, external_sd, is_touched, dt)
-        has_task = isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand
-        if (has_task and task is None) or (self._run.key == "joints" and torque is None):
+        topic = "force_command" if task is None else "task_command"
+        if task is None and torque is not None and own.mode != "open_loop":
+            topic, task, torque = "joint_torque_command", TaskCommand(BASE, joint_axes(AxisKind.FORCE, torque)), None
+        if task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
             self._admission.restart(q)  # the arm stays where it is
         commands = self._admission.step(own, q, command, posture, torque, dt, task)
         self.refusals = commands.refusals
@@ -253,7 +255,7 @@ class ForceLoop:
         found += self._watch_motions(found, commands.posture if posture is not None else None, rate, dt)
         self.events = _by_seriousness(self._advised(found, done))
         if self.event.holds:
-            self.refusals["task_command" if task else "force_command"] = self.event
+            self.refusals[topic] = self.event
         self._velocity = velocity
         return self._output(velocity, fed, frame, bool(task))
 
@@ -426,7 +428,7 @@ class ForceLoop:
         run, own = self._run, self.parameters
         speeds = [self._speed(one, factor, dt) for one in run.axes]
         watch = self._supervision.watch
-        is_assessed = watch is None or bool(watch.assessed) or all(one.now.sensed is None for one in run.axes)
+        is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_force for one in run.axes)
         if is_watching or not is_assessed:
             speeds = [0.0] * len(speeds)
         run.delayed.append(speeds)
@@ -569,7 +571,7 @@ class ForceLoop:
                 law = (own.task.largest_rate, own.task.fastest(axis.is_joint)[0])
                 goal = one.goal(axis, 0.0, math.inf)
                 events.append(one.motion.step(axis.of.name, axis.of.unit, goal, speed, axis.at, *law, lasting, dt))
-        if not run.axes and posture is not None and own.mode == "hybrid":
+        if not run.axes and posture is not None:
             law, rates = (own.posture_gain, own.joint_speed_limit), rate or [0.0] * len(self._q)
             for (name, watch), goal, speed, at in zip(run.joints.items(), posture, rates, self._q, strict=True):
                 events.append(watch.step(name, "rad", goal, speed, at, *law, lasting, dt))
@@ -617,10 +619,6 @@ def _task(commands: Commands, task: TaskCommand | None, own: ForceLoopParameters
     if task is not None:
         kept = (axis._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0) for axis in task.axes)
         return task, (TaskCommand, task.frame, *kept)
-    if own.mode == "joint_torque":
-        if commands.torque is None:
-            return None, None
-        return TaskCommand(BASE, joint_axes(AxisKind.FORCE, commands.torque)), "joints"
     force = commands.force
     if force is None or not any(force.force):
         return None, None

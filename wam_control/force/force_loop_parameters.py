@@ -86,9 +86,8 @@ class ForceLoopParameters:
     limits: LimitParameters
     task: TaskParameters
     mode: str = parameter(
-        "hybrid: force along its direction, posture in all others; joint_torque: torque of each joint; "
-        "open_loop: J^T F fed forward, no feedback",
-        choices=("hybrid", "joint_torque", "open_loop"),
+        "hybrid: force along its direction, posture in all others; open_loop: J^T F fed forward, no feedback",
+        choices=("hybrid", "open_loop"),
         live=True,
     )
     feedback: str = parameter(
@@ -110,7 +109,7 @@ class ForceLoopParameters:
     )
     force_limit: float = tunable("largest force that may be commanded", "N", high=1e3)
     torque_gain: tuple[float, ...] = tunable(
-        "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", high=100.0
+        "G_I of each joint whose torque is commanded, or one for all", "rad/s/(N m)", high=100.0
     )
     torque_proportional_gain: tuple[float, ...] = tunable("G_P of each joint, or one for all", "rad/(N m)", high=100.0)
     torque_error_limit: tuple[float, ...] = tunable(
@@ -234,14 +233,12 @@ def torque_law(parameters: ForceLoopParameters, joints: tuple[str, ...]) -> Forc
     )
 
 
-def task_of(parameters: ForceLoopParameters, law: ForceLaw) -> GuardedTask:
+def task_of(parameters: ForceLoopParameters) -> GuardedTask:
     """What the guard needs to know of a parameter set."""
-    is_joints = parameters.mode == "joint_torque"
     return GuardedTask(
-        law=law,
-        is_joints=is_joints,
+        law=force_law(parameters),
         feedback=Feedback(parameters.feedback, parameters.spring_stiffness, parameters.guard.feedback_lag),
         hold_gain=parameters.posture_gain,
-        filter_time=0.0 if is_joints else parameters.force_filter,
+        filter_time=parameters.force_filter,
         delay_samples=parameters.delay_samples,
     )

@@ -111,8 +111,7 @@ class ForceMeasurement:
         self._external = torque - self._zeros
         counted = self._external if is_touched or not own.is_estimated else self._none
         before = self._filters["torque"].value
-        lag = 0.0 if own.mode == "joint_torque" else own.force_filter
-        now = self._filters["torque"].step(counted, lag, dt)
+        now = self._filters["torque"].step(counted, own.force_filter, dt)
         sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._torque_sd
         self.torques = WorldTorques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
 

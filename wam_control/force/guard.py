@@ -7,7 +7,7 @@ one only after the arm has moved.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from wam_control.force.stability_guard import (
     listed,
     posture_of,
 )
-from wam_control.force.thresholds import GUARD
+from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 from wam_description.transmission_map import TransmissionMap
@@ -66,39 +66,36 @@ class Supervision:
     ) -> None:
         self.parameters, self.servo = parameters, servo
         self.wound = TransmissionMap.of(arm).at_joints(servo.integral_gain)
-        self._joints = arm.joints.names
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
         self._guard = StabilityGuard(arm, servo, timing, parameters.guard, sensing_of(parameters))
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
-        self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, self._joints)
+        self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, arm.joints.names)
         self.lowered = _lowered(parameters, self.parameters)
         self._report()
 
     def _judge(self, postures: Sequence[tuple[float, ...]]) -> None:
         guard, parameters = self._guard, self.parameters
-        is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
         position_sd = parameters.contact_position_sd
         contacts = [
             contact
             for q in postures
             for contact in guard.contacts(q, parameters.contact_cover, parameters.contact_position, position_sd)
         ]
-        if not is_joints:  # what is not known well enough is refused
-            contacts = [
-                each
-                for each in contacts
-                if guard.axis(each).force_sd <= parameters.limits.doubt * tolerance(each.force, parameters)
-            ]
+        contacts = [  # what is not known well enough is refused
+            each
+            for each in contacts
+            if guard.axis(each).force_sd <= parameters.limits.doubt * tolerance(each.force, parameters)
+        ]
         task, found = self._assess(contacts)
-        if mode == "limit":
-            if not (found.scale or is_joints):
+        if parameters.guard.mode == "limit":
+            if not found.scale:
                 task, found = self._soften(contacts)
             if found.reason and found.scale:
-                self.parameters = _accepted(self.parameters, task.law.group, guard.accepted_scale(found))
+                self.parameters = _accepted(self.parameters, guard.accepted_scale(found))
                 task, found = self._assess(contacts)
-        require(not found.reason or mode == "warn", found.reason)
+        require(not found.reason or parameters.guard.mode == "warn", found.reason)
         self.assessment, self.watch = found, Watch(guard, task, found)
 
     def _soften(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
@@ -117,17 +114,15 @@ class Supervision:
         return self._assess(contacts)
 
     def _assess(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
-        own = self.parameters
-        task = task_of(own, torque_law(own, self._joints) if own.mode == "joint_torque" else force_law(own))
+        task = task_of(self.parameters)
         return task, self._guard.assess(task, contacts)
 
     def _report(self) -> None:
-        own = self.parameters
-        self.report = report(self.assessment, self.watch, own.guard.mode, own.mode == "joint_torque", self.lowered)
+        self.report = report(self.assessment, self.watch, self.parameters.guard.mode, self.lowered)
 
     def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
-        """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
-        return self._guard.contacts(q, cover, position, position_sd)
+        """Contacts at a position of a cover, m, along both axes across it, with any force."""
+        return self._guard.contacts(q, cover, position, position_sd, [FORCE.sized_force])
 
     def gains(self, joint: int, direction: Sequence[float]) -> tuple[float, float]:
         """G_I and G_P of a joint, or for -1 of the force along a unit vector of its frame (3,)."""
@@ -231,7 +226,7 @@ class Report(NamedTuple):
     facts: dict[str, str]
 
 
-def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, is_joints: bool, lowered: str) -> Report:
+def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, lowered: str) -> Report:
     """Report on the parameters in force.
 
     Parameters
@@ -239,12 +234,10 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
     assessment : of these parameters; None where the guard is off or nothing is fed back.
     watch : what the guard does while the arm moves.
     mode : of the guard.
-    is_joints : whether joint torques are controlled, else the force along a direction.
     lowered : what the guard has lowered, '' where nothing.
     """
     if assessment is None or watch is None:
         return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
-    force, length = ("N m", "rad") if is_joints else ("N", "m")
     here = min(watch.scale, assessment.scale)
     message = f"domain {assessment.domain}{lowered and ', lowered to be stable: '}{lowered}"
     if assessment.reason:
@@ -263,20 +256,21 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
         "lowered": lowered or "nothing",
         "worst": assessment.where,
-        f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",
-        f"limit cycle [{force}]": f"{cycle.peak_to_peak:.4g}",
+        "effective stiffness [N/m]": f"{assessment.stiffness:.4g}",
+        "limit cycle [N]": f"{cycle.peak_to_peak:.4g}",
         "limit cycle [s]": f"{cycle.period:.4g}",
-        f"deadband that removes it [{force}]": f"{cycle.deadband:.4g}",
+        "deadband that removes it [N]": f"{cycle.deadband:.4g}",
         "verdict": assessment.reason or "accepted",
     }
     return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
 
 
-def _accepted(own: ForceLoopParameters, group: str, scale: float) -> ForceLoopParameters:
+def _accepted(own: ForceLoopParameters, scale: float) -> ForceLoopParameters:
     """The set that the reason of a refusal advises: gains lower by a scale."""
-    names = f"{group}_gain", f"{group}_proportional_gain"
-    values: dict[str, Any] = {name: tuple(scale * gain for gain in getattr(own, name)) for name in names}
-    return replace(own, **values)
+    gain, proportional = (
+        tuple(scale * each for each in gains) for gains in (own.force_gain, own.force_proportional_gain)
+    )
+    return replace(own, force_gain=gain, force_proportional_gain=proportional)
 
 
 def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:

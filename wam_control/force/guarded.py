@@ -24,7 +24,9 @@ def guarded(
     own: ForceLoopParameters,
     supervision: Supervision,
 ) -> list[Guarded]:
-    """Where the commanded axes press: at all contacts at once; nothing where nothing is sensed at a point.
+    """Where the commanded axes press: at all contacts at once; nothing where nothing presses.
+
+    Torques of joints press wherever something is: each of its contacts is considered by itself.
 
     Parameters
     ----------
@@ -35,21 +37,17 @@ def guarded(
     own : parameters of the force loop.
     supervision : its gains.
     """
-    if own.mode == "joint_torque" and all(axis.is_joint for axis in axes):  # they press wherever something is
-        place = ContactPlace(forces.covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
-        return list(supervision.contacts(q, place.cover, place.position, place.position_sd))
-    return list(_linear(q, axes, own, supervision))
-
-
-def _linear(
-    q: Sequence[float], axes: Sequence[CommandedAxis], own: ForceLoopParameters, supervision: Supervision
-) -> list[GuardedForces]:
     contacts = []
     for axis in axes:
         if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < np.inf:
             x, y, z = axis.direction.tolist()
             contacts.append(GuardedContact(tuple(q), *axis.place[:3], (x, y, z), axis.desired or FORCE.hand))
-    if not contacts:
+    if contacts:
+        together = [tuple(contacts)]
+    elif any(axis.is_joint and axis.is_force for axis in axes):
+        place = ContactPlace(forces.covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
+        together = [(one,) for one in supervision.contacts(q, place.cover, place.position, place.position_sd)]
+    else:
         return []
     n = len(q)
     move, left = linear([axis.along for axis in axes], n)
@@ -66,4 +64,4 @@ def _linear(
                 damping = own.task.damping(axis.of)
                 rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
             hold = hold + rate * np.outer(move[:, i], axis.along)
-    return [GuardedForces(tuple(contacts), sense, move, gain[0], gain[1], hold)]
+    return [GuardedForces(each, sense, move, gain[0], gain[1], hold) for each in together]

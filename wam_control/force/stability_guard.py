@@ -70,8 +70,7 @@ class GuardedTask(NamedTuple):
 
     Attributes
     ----------
-    law : of the axes or the joints.
-    is_joints : whether the joints are controlled, else the force along a direction.
+    law : of the axes of the force.
     feedback : where the force comes from.
     hold_gain : posture gain, 1/s.
     filter_time : time constant of the low pass on the force, s.
@@ -79,7 +78,6 @@ class GuardedTask(NamedTuple):
     """
 
     law: ForceLaw
-    is_joints: bool
     feedback: Feedback
     hold_gain: float
     filter_time: float
@@ -142,9 +140,9 @@ class GuardAssessment(NamedTuple):
     ----------
     domain : of figure 5.8; below `stability_fraction` of the linear margin counts as I.
     scale : factor of the gains at which the loop becomes linearly unstable, up to `largest_scale`.
-    stiffness : k_tr k_c/(k_tr + k_c) at the contact or the joint, N/m or N m/rad.
+    stiffness : k_tr k_c/(k_tr + k_c) at the contact, N/m.
     cycle : stiction limit cycle by (5.8) and (5.9).
-    where : the worst contact: joint or direction of the force, position and posture.
+    where : the worst contact: direction of the force, position and posture.
     reason : why the parameters are refused, '' if they are accepted.
     """
 
@@ -190,13 +188,20 @@ class StabilityGuard:
     def __hash__(self) -> int:
         return hash(self._whole)
 
-    def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
-        """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
+    def contacts(
+        self,
+        q: Sequence[float],
+        cover: str,
+        position: float,
+        position_sd: float,
+        forces: Sequence[float] = GUARD.forces,
+    ) -> list[GuardedContact]:
+        """Contacts at a position of a cover, m: along both axes across it, with each of some forces, N."""
         rotation = self._loop.body.cover_pose(q, cover).rotation
         candidates = [
             GuardedContact(tuple(q), cover, position, position_sd, _triple(rotation[:, axis]), force)
             for axis in (1, 2)
-            for force in GUARD.forces
+            for force in forces
         ]
         return [contact for each in candidates for contact in self.with_lever(each)]
 
@@ -249,35 +254,25 @@ class StabilityGuard:
                 Domain.I, GUARD.largest_scale, 0.0, PredictedCycle(0.0, 0.0, 0.0), "nothing is controlled", ""
             )
         scale, contact = min((min(self.scales(task, [each])), each) for each in contacts)
-        nodes = {name: self.node(task, contact, i) for i, name in enumerate(law.names)}
-        cycles = {name: stiction_cycle(node, gain) for (name, node), gain in zip(nodes.items(), law.gain, strict=True)}
-        name = max(cycles, key=lambda axis: cycles[axis].peak_to_peak)
-        node = nodes[name]
-        ktr, kc = node.transmission_stiffness, node.contact_stiffness
-        what = name if task.is_joints else f"force along {listed(contact.direction)} in the base frame"
-        where = f"{what} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
+        node = self.node(contact)
+        stiffness = float(series_stiffness(node.transmission_stiffness, node.contact_stiffness))
+        along = f"force along {listed(contact.direction)} in the base frame"
+        where = f"{along} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
         domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
-        found = GuardAssessment(domain, scale, float(series_stiffness(ktr, kc)), cycles[name], where, "")
+        found = GuardAssessment(domain, scale, stiffness, stiction_cycle(node, max(law.gain)), where, "")
         return found if domain is Domain.I else found._replace(reason=self._refusal(law, found))
 
     def accepted_scale(self, found: GuardAssessment) -> float:
         """Factor of the gains up to which they are accepted as domain I."""
         return (1.0 - GUARD.slack) * self.parameters.stability_fraction * found.scale
 
-    def node(self, task: GuardedTask, contact: GuardedContact, axis: int) -> FrictionNode:
-        """The arm as the one friction node of figure 5.4, along the direction or at a joint.
+    def node(self, contact: GuardedContact) -> FrictionNode:
+        """The arm as the one friction node of figure 5.4, along the direction of a force.
 
         With the friction of the joints alone: the velocity loop encloses that of the rotors.
         """
         joints, loop = self._arm.joints, self._loop
-        stiffness = self.parameters.contact_stiffness
-        if task.is_joints:
-            reach = np.zeros(len(joints.names))
-            reach[axis] = 1.0
-            jacobian = loop.body.point_jacobian(contact.q, contact.cover, (contact.position, 0.0, 0.0))
-            stiffness *= float(np.sum(jacobian[:, axis] ** 2))
-        else:
-            reach = self.axis(contact).lever
+        reach = self.axis(contact).lever
         square = float(reach @ reach)
         inertia = loop.body.mass_matrix(contact.q) + loop.armature
 
@@ -292,24 +287,24 @@ class StabilityGuard:
             inertia=along(inertia),
             damping=along(np.diag(damping)) if damping.all() else 0.0,
             transmission_stiffness=along(loop.joint_stiffness),
-            contact_stiffness=max(stiffness, 1e-9),
+            contact_stiffness=self.parameters.contact_stiffness,
             dynamic_friction=friction(joints.dynamic_friction),
             static_friction=friction(joints.static_friction),
         )
 
     def _refusal(self, law: ForceLaw, found: GuardAssessment) -> str:
         """Why gains above their linear margin are refused, and what would be accepted."""
-        gain, most = f"{law.group}_gain", self.accepted_scale(found)
+        most = self.accepted_scale(found)
         surface = f"contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         if not found.scale:
-            also = f"{law.group}_proportional_gain, " if any(law.proportional_gain) else ""
+            also = "force_proportional_gain, " if any(law.proportional_gain) else ""
             return (
-                f"{gain} {listed(law.gain)} is not stable, nor is a hundredth of it ({found.where}, {surface}); lower "
-                f"posture_gain, {also}or guard.contact_stiffness"
+                f"force_gain {listed(law.gain)} is not stable, nor is a hundredth of it ({found.where}, {surface}); "
+                f"lower posture_gain, {also}or guard.contact_stiffness"
             )
         return (
-            f"{gain} {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one: domain "
-            f"{found.domain}; allowed: {gain} up to {listed([rounded_down(most * each) for each in law.gain])}; "
+            f"force_gain {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one: domain "
+            f"{found.domain}; allowed: force_gain up to {listed([rounded_down(most * each) for each in law.gain])}; "
             f"guard.stability_fraction is {self.parameters.stability_fraction:g}; worst case: {found.where}, {surface}"
         )
 
@@ -329,11 +324,7 @@ class StabilityGuard:
         delay = task.delay_samples * timing.outer_divisor + timing.outer_delay + late
         if isinstance(contact, GuardedForces):
             return Axes(*contact[1:], task.filter_time, delay)
-        law = task.law
-        if task.is_joints:
-            gains = np.array(law.gain), np.array(law.proportional_gain)
-            return Axes(np.eye(n), np.eye(n), *gains, np.zeros((n, n)), 0.0, delay)
-        axis = self.axis(contact)
+        axis, law = self.axis(contact), task.law
         lever = axis.lever
         hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / float(lever @ lever))
         gains = np.array([max(law.gain)]), np.array([max(law.proportional_gain)])

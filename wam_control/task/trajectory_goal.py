@@ -39,6 +39,52 @@ class JointTolerance(NamedTuple):
 NO_TOLERANCE: Final = JointTolerance()
 
 
+class TrajectoryPlayer:
+    """Converts trajectories to postures.
+
+    Parameters
+    ----------
+    arm : with the limits of the joints.
+    limits : of motions.
+
+    Attributes
+    ----------
+    refusal : why the present trajectory is not played, '' where it is.
+    motion : the present trajectory; None until the arm is at rest and it has begun.
+    time : s, since it began.
+    """
+
+    def __init__(self, arm: Arm, limits: MotionParameters) -> None:
+        self._arm, self._limits = arm, limits
+        self._present: PosturePath | None = None
+        self.motion: PostureMotion | None = None
+        self.time, self.refusal = 0.0, ""
+
+    def step(self, trajectory: PosturePath | None, q: Sequence[float], qd: Sequence[float], dt: float) -> Moving | None:
+        """The posture of this period; None where the arm is to stay where it is.
+
+        Parameters
+        ----------
+        trajectory : that is streamed now; None for none.
+        q, qd : joint angles and velocities (n,), rad and rad/s.
+        dt : outer period, s.
+        """
+        if trajectory != self._present:
+            self._present, self.motion, self.time, self.refusal = trajectory, None, 0.0, ""
+        if trajectory is None or self.refusal:
+            return None
+        if self.motion is None:
+            if max(map(abs, qd)) > MOTION.at_rest:
+                return None
+            try:
+                self.motion = PostureMotion(q, trajectory, self._arm, self._limits)
+            except ParameterError as error:
+                self.refusal = f"{error}; the arm stays where it is"
+                return None
+        self.time += dt
+        return self.motion.at(self.time)
+
+
 class TrajectoryGoal:
     """Compares the arm with a trajectory that the force loop plays at the same time.
 
@@ -53,7 +99,6 @@ class TrajectoryGoal:
     Attributes
     ----------
     desired : where the arm is to be; None until it is at rest and the trajectory has begun.
-    time : s, since it began.
     """
 
     def __init__(
@@ -65,15 +110,18 @@ class TrajectoryGoal:
         at_goal: Mapping[str, JointTolerance],
         goal_time: float,
     ) -> None:
-        self._path, self._arm, self._limits = path, arm, limits
-        names = arm.joints.names
+        self._path, self._player = path, TrajectoryPlayer(arm, limits)
+        self._names = names = arm.joints.names
         self._on_path = [on_path.get(name, NO_TOLERANCE) for name in names]
         goal = [at_goal.get(name, NO_TOLERANCE) for name in names]
         self._at_goal = [one._replace(position=one.position or MOTION.arrived) for one in goal]
         self._goal_time = goal_time or MOTION.goal_time
-        self._motion: PostureMotion | None = None
         self.desired: Moving | None = None
-        self.time = 0.0
+
+    @property
+    def time(self) -> float:
+        """Since the trajectory began, s."""
+        return self._player.time
 
     def step(self, joints: State, dt: float) -> GoalEnd | None:
         """Go on by one period; how the goal ended, None while it has not.
@@ -83,18 +131,14 @@ class TrajectoryGoal:
         joints : angles and velocities (n,), rad and rad/s.
         dt : s, since the last period.
         """
-        if self._motion is None:
-            if max(map(abs, joints.velocity)) > MOTION.at_rest:
-                return None
-            try:
-                self._motion = PostureMotion(joints.position, self._path, self._arm, self._limits)
-            except ParameterError as error:
-                return GoalEnd(GoalCode.INVALID_GOAL, str(error))
-        self.time += dt
-        self.desired = self._motion.at(self.time)
+        self.desired = self._player.step(self._path, joints.position, joints.velocity, dt)
+        if self._player.refusal:
+            return GoalEnd(GoalCode.INVALID_GOAL, self._player.refusal)
+        if self.desired is None or self._player.motion is None:
+            return None
         if off := self._error(joints, self._on_path):
             return GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, f"{off}, {self.time:.3f} s after the start")
-        late = self.time - self._motion.duration
+        late = self.time - self._player.motion.duration
         if late < 0.0:
             return None
         if not (off := self._error(joints, self._at_goal)):
@@ -108,53 +152,7 @@ class TrajectoryGoal:
         assert self.desired is not None
         pairs = ((self.desired.position, joints.position, "rad"), (self.desired.velocity, joints.velocity, "rad/s"))
         for k, (desired, actual, unit) in enumerate(pairs):
-            for name, want, got, most in zip(self._arm.joints.names, desired, actual, allowed, strict=True):
+            for name, want, got, most in zip(self._names, desired, actual, allowed, strict=True):
                 if 0.0 < most[k] < abs(got - want):
                     return f"{name} is off by {got - want:.3g} {unit}, allowed: {most[k]:g} {unit}"
         return ""
-
-
-class TrajectoryPlayer:
-    """Converts trajectories to postures.
-
-    Parameters
-    ----------
-    arm : with the limits of the joints.
-    limits : of motions.
-
-    Attributes
-    ----------
-    refusal : why the present trajectory is not played, '' where it is.
-    """
-
-    def __init__(self, arm: Arm, limits: MotionParameters) -> None:
-        self._arm, self._limits = arm, limits
-        self._present: PosturePath | None = None
-        self._motion: PostureMotion | None = None
-        self._time = 0.0
-        self.refusal = ""
-
-    def step(self, trajectory: PosturePath | None, q: Sequence[float], qd: Sequence[float], dt: float) -> Moving | None:
-        """The posture of this period; None where the arm is to stay where it is.
-
-        Parameters
-        ----------
-        trajectory : that is streamed now; None for none.
-        q, qd : joint angles and velocities (n,), rad and rad/s.
-        dt : outer period, s.
-        """
-        if trajectory != self._present:
-            self._present, self._motion, self.refusal = trajectory, None, ""
-        if trajectory is None or self.refusal:
-            return None
-        if self._motion is None:
-            if max(map(abs, qd)) > MOTION.at_rest:
-                return None
-            try:
-                self._motion = PostureMotion(q, trajectory, self._arm, self._limits)
-            except ParameterError as error:
-                self.refusal = f"{error}; the arm stays where it is"
-                return None
-            self._time = 0.0
-        self._time += dt
-        return self._motion.at(self._time)
