@@ -9,7 +9,7 @@ from typing import Any
 
 from wam_description.arm import Shared, Timing
 from wam_description.parameters import build_part
-from wam_description.signals import Wrench
+from wam_description.signals import Answer, Wrench
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_description.world import World
@@ -22,8 +22,9 @@ from wam_live.scene import Scene
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
 from wam_live.thresholds import LIVE
-from wam_ros.client import Reply, StackClient
+from wam_ros.client import StackClient
 from wam_ros.messages import message_type
+from wam_ros.requests import answer_of
 from wam_ros.run import Connection
 from wam_ros.topics import qos
 from wam_ros.wire import stamp_of
@@ -216,10 +217,10 @@ class ShownStack:
             self.panel.notify(f"{request.node} does not answer", refused=True)
             return
         client.call_async(message).add_done_callback(
-            lambda future: self._answered(request, Reply.of(request, future.result()), text)
+            lambda future: self._answered(request, answer_of(request, future.result()), text)
         )
 
-    def _answered(self, request: Call | SetParameters, reply: Reply, text: str) -> None:
+    def _answered(self, request: Call | SetParameters, reply: Answer, text: str) -> None:
         if isinstance(request, Call):
             self.panel.notify(text or reply.message, refused=not reply.success)
             return

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.node import Node, NodeNameNonExistentError
@@ -16,13 +16,13 @@ from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.parameters import build_part
-from wam_description.signals import NodeStatus
+from wam_description.signals import Answer, NodeStatus
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import Refused, message_type
 from wam_ros.remote_parameters import RemoteParameters
-from wam_ros.requests import Request, refusal_of, service_request
+from wam_ros.requests import Request, answer_of, service_request
 from wam_ros.run import Closing, Connection
 from wam_ros.tolerance import LeavingNode
 from wam_ros.topics import NAMESPACE, listening, qos
@@ -30,20 +30,6 @@ from wam_ros.wire import decoder, encoder, stamp_of, status_of
 
 MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
 START: Final = "start the stack with 'wam up'"
-
-
-class Reply(NamedTuple):
-    """The answer to a request."""
-
-    success: bool
-    message: str
-
-    @classmethod
-    def of(cls, request: Request, answer: Any) -> "Reply":
-        """The answer of the service of a request."""
-        refusal = refusal_of(request, answer)
-        stated = answer.results[0].reason if isinstance(request, SetParameters) else answer.message
-        return cls(not refusal, refusal or stated)
 
 
 class NoAnswerError(OSError):
@@ -106,19 +92,19 @@ class StackClient(Closing):
         service, kind, message = service_request(request)
         return self.client(kind, service), message
 
-    def request(self, request: Call | SetParameters, seconds: float = CALL_LIMITS.answer) -> Reply:
+    def request(self, request: Call | SetParameters, seconds: float = CALL_LIMITS.answer) -> Answer:
         """Ask a node and wait for its answer, for this time."""
         client, message = self.service(request)
         name = self.node.resolve_service_name(client.srv_name)
         if not self.wait(client.service_is_ready, seconds):
             there = self._nodes_without(request.node) or self._services(request.node)
             advice = f"there are {', '.join(there)}" if there else START
-            return Reply(False, f"no service {name} within {seconds:g} s; {advice}")
+            return Answer(False, f"no service {name} within {seconds:g} s; {advice}")
         attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
         answer = self.answer(client, message, seconds, attempt)
         if answer is None:
-            return Reply(False, f"no answer from {name} within {seconds:g} s; its node is busy or has ended")
-        return Reply.of(request, answer)
+            return Answer(False, f"no answer from {name} within {seconds:g} s; its node is busy or has ended")
+        return answer_of(request, answer)
 
     def answer(self, client: Any, message: Any, seconds: float, attempt: float = CALL_LIMITS.attempt) -> Any:
         """The answer of a service, None where there is none.

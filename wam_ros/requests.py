@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from rcl_interfaces.srv import SetParameters as SetParametersService
 from rclpy.node import Node
@@ -12,38 +12,34 @@ from rclpy.parameter import Parameter
 from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
 
+from wam_description.signals import Answer
 from wam_description.wiring import Call, SetParameters
 from wam_ros.limits import NODE_LIMITS
 
 Request = Call | SetParameters
 
 
-class ServiceRequest(NamedTuple):
-    """Service name relative to the stack's namespace, its type, and the request message."""
-
-    service: str
-    kind: Any
-    message: Any
-
-
-def service_request(request: Request) -> ServiceRequest:
-    """What a request to another node is on ROS."""
+def service_request(request: Request) -> tuple[str, Any, Any]:
+    """What a request to another node is on ROS: service relative to the stack's namespace, its type, the message."""
     if isinstance(request, SetParameters):
         sent = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
         message = SetParametersService.Request(parameters=sent)
-        return ServiceRequest(f"{request.node}/set_parameters", SetParametersService, message)
+        return f"{request.node}/set_parameters", SetParametersService, message
     if request.data is None:
-        return ServiceRequest(f"{request.node}/{request.service}", Trigger, Trigger.Request())
-    return ServiceRequest(f"{request.node}/{request.service}", SetBool, SetBool.Request(data=request.data))
+        return f"{request.node}/{request.service}", Trigger, Trigger.Request()
+    return f"{request.node}/{request.service}", SetBool, SetBool.Request(data=request.data)
 
 
-def refusal_of(request: Request, answer: Any) -> str:
-    """Why a request was refused, '' where it was not."""
-    if isinstance(request, SetParameters):
-        if len(answer.results) != len(request.values):
-            return f"{request.node} failed while it set the parameters and may use some of them; its log has the reason"
-        return "; ".join(result.reason for result in answer.results if not result.successful)
-    return "" if answer.success else str(answer.message)
+def answer_of(request: Request, response: Any) -> Answer:
+    """The answer of the service of a request."""
+    if not isinstance(request, SetParameters):
+        return Answer(response.success, response.message)
+    results = response.results
+    if len(results) != len(request.values):
+        failed = f"{request.node} failed while it set the parameters and may use some of them; its log has the reason"
+        return Answer(False, failed)
+    refused = [result for result in results if not result.successful]
+    return Answer(not refused, "; ".join(result.reason for result in refused or results[:1]))
 
 
 class RequestQueue:
@@ -105,7 +101,8 @@ class RequestQueue:
 
     def _answered(self, request: Request, answer: Any) -> None:
         self._is_asking = False
-        if refusal := refusal_of(request, answer):
+        success, text = answer_of(request, answer)
+        if not success:
             self._waiting.clear()
-            self._refused(f"{request.node} refuses: {refusal}" if isinstance(request, SetParameters) else refusal)
+            self._refused(f"{request.node} refuses: {text}" if isinstance(request, SetParameters) else text)
         self._go_on()

@@ -20,7 +20,7 @@ from wam_bag.bag import Bag, read
 from wam_bag.columns import Columns, columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import Interface, declared, require_parameters
-from wam_description.parameters import ParameterError
+from wam_description.parameters import ParameterError, dotted
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH
 from wam_description.wiring import Call
@@ -408,7 +408,7 @@ def configured(
     for name, value in values.items():
         if isinstance(value, Mapping):
             section, begin = (SHARED, f"{name}.") if name in groups else (name, "")
-            changed.setdefault(section, {}).update(_flat(value, begin))
+            changed.setdefault(section, {}).update(dotted(value, begin))
         elif not _is_node(value):
             changed[SHARED][name] = value
     return base.with_sections(changed)
@@ -428,10 +428,3 @@ def _is_node(value: Any) -> bool:
 
 def _entry(node: Any) -> str:
     return node if isinstance(node, str) else f"{node.__module__}:{node.__qualname__}"
-
-
-def _flat(values: Mapping[str, Any], begin: str) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in values.items():
-        found |= _flat(value, f"{begin}{key}.") if isinstance(value, Mapping) else {f"{begin}{key}": value}
-    return found

@@ -116,19 +116,19 @@ class TolerantNode(LeavingNode):
         return serve
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """As that of rclpy, whose reason for a name that no parameter has lists nothing."""
-        for found in parameter_list:
-            if not self.has_parameter(found.name):
-                return SetParametersResult(successful=False, reason=self._unknown(found.name))
+        """As that of rclpy, whose reason for a name that cannot be set lists nothing."""
+        for name in (found.name for found in parameter_list):
+            shown = printable(name, 100)
+            if not self.has_parameter(name):
+                return self._refusal(name, f"unknown parameter '{shown}'")
+            if self.describe_parameter(name).read_only:
+                return self._refusal(name, f"parameter '{shown}' is chosen at the start")
         return super().set_parameters_atomically(parameter_list)
 
-    def _unknown(self, name: str) -> str:
-        names = sorted(self.list_parameters([], 0).names)
-        live = [one for one in names if not self.describe_parameter(one).read_only]
-        return (
-            f"unknown parameter '{printable(name, 100)}'; {meant(name, live)}allowed, as they can change while node "
-            f"{self.get_name()} runs: {', '.join(live) or 'none'}"
-        )
+    def _refusal(self, name: str, reason: str) -> SetParametersResult:
+        live = [one for one in sorted(self.list_parameters([], 0).names) if not self.describe_parameter(one).read_only]
+        allowed = f"allowed, as they can change while node {self.get_name()} runs: {', '.join(live) or 'none'}"
+        return SetParametersResult(successful=False, reason=f"{reason}; {meant(name, live)}{allowed}")
 
     def _take_exception(self, what: str, error: Exception) -> None:
         self._exception_time = time.monotonic()

@@ -24,7 +24,7 @@ from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
 from wam_description.wiring import SetParameters as SetParametersRequest
 from wam_ros.node import AdaptedNode, make_node, parameter_file
-from wam_ros.requests import refusal_of
+from wam_ros.requests import answer_of
 
 ROOT = Path(__file__).parents[2]
 WAM = Configuration.load(packaged("wam"))
@@ -293,7 +293,7 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
 
 def test_an_answer_without_a_result_is_no_success() -> None:
     request = SetParametersRequest("filter", {"gain": 0.7})
-    assert "filter failed while it set the parameters" in refusal_of(request, SetParameters.Response())
+    assert "filter failed while it set the parameters" in answer_of(request, SetParameters.Response()).message
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -16,12 +16,12 @@ from wam_control.task.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields
-from wam_description.signals import Wrench
+from wam_description.signals import Answer, Wrench
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_live.push import push
-from wam_ros.client import START, Reply, StackClient
+from wam_ros.client import START, StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
 from wam_ros.process_signals import bound_leaving
@@ -107,7 +107,7 @@ def run(given: argparse.Namespace) -> int:
             raise
 
 
-def _stated(replies: Sequence[Reply]) -> int:
+def _stated(replies: Sequence[Answer]) -> int:
     """Print the last answer, or the first refusal."""
     reply = next((reply for reply in replies if not reply.success), replies[-1])
     print(reply.message, file=sys.stdout if reply.success else sys.stderr)
@@ -155,9 +155,6 @@ def _set(given: argparse.Namespace, stack: StackClient) -> int:
     else:
         new = _like(value, like, key)
     reply = stack.request(SetParameters(node, {name: new}))
-    if not reply.success and name not in stack.live(node, values):
-        chosen = f"{key} is chosen at the start and cannot change while the node runs"
-        return _stated([reply._replace(message=f"{chosen}; 'wam call get {node}' lists those that can")])
     if reply.success:
         reply = reply._replace(message="; ".join(filter(None, (f"{key}={value}", reply.message))))
     return _stated([reply])
