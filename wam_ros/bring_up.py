@@ -7,23 +7,21 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from pathlib import Path
+from functools import partial
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from rclpy.logging import get_logger
-from rclpy.node import Node
 
 from wam_description.configuration import Configuration
 from wam_description.interface import declared, require_parameters
 from wam_description.nodes import EACH, ONE
 from wam_ros.limits import PROCESS_LIMITS
-from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node, parameter_file
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
-from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, prepare_logging_directory
+from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory
 from wam_ros.topics import NAMESPACE
 
 LOGGER: Final = get_logger("wam")
@@ -250,7 +248,7 @@ def _ending(code: int) -> str:
     return f"was ended from outside by {name}{cause}"
 
 
-class Composition(Connection):
+class Composition(Nodes):
     """Nodes in this process, in one executor; leaving the context destroys them, brakes first, bag last.
 
     Parameters
@@ -263,7 +261,6 @@ class Composition(Connection):
 
     Attributes
     ----------
-    nodes : the nodes by name.
     killed : none, as nodes of this process end by themselves.
     """
 
@@ -279,31 +276,14 @@ class Composition(Connection):
         log_level: str = "info",
     ) -> None:
         names = node_names(configuration)
-        super().__init__(["wam", "--ros-args", "--log-level", log_level], domain_id)
-        BUSES[self.context] = LocalBus(self.executor, names.values())
-        self.nodes: dict[str, Node] = {}
-        self._may_end: dict[str, Any] = {}
-        try:
-            with parameter_file(configuration) as parameters:
-                for entry, name in names.items():
-                    if not is_stopped():
-                        self._make(entry, name, namespace, parameters)
-        except BaseException:
-            self.close()
-            raise
-
-    def _make(self, entry: str, name: str, namespace: str, parameters: Path) -> None:
-        node = make_node(
-            entry,
-            context=self.context,
-            namespace=namespace,
-            cli_args=["--ros-args", "--params-file", str(parameters)],
-            use_global_arguments=False,
-        )
-        self.nodes[name] = node
-        self.add(node)
-        if hasattr(getattr(node, "node", node), "done"):
-            self._may_end[name] = node
+        with parameter_file(configuration) as file:
+            own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
+            makers = {name: partial(make_node, entry, **own) for entry, name in names.items()}
+            arguments = ["wam", "--ros-args", "--log-level", log_level]
+            super().__init__(makers, arguments, namespace, domain_id, is_stopped)
+        self._may_end = {
+            name: node for name, node in self.nodes.items() if hasattr(getattr(node, "node", node), "done")
+        }
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name, as if they were processes."""
@@ -327,8 +307,7 @@ class Composition(Connection):
         str
             why the scenario failed, '' where it did not.
         """
-        scenario: Any = self.nodes["scenario"]
-        driver: Any = self.nodes["driver"]
+        scenario, driver = self.nodes["scenario"], self.nodes["driver"]
         self.spin(lambda: is_stopped(driver.driver.stamp / 1e9) or bool(scenario.done))
         return str(scenario.failure)
 

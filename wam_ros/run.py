@@ -17,7 +17,6 @@ from weakref import WeakKeyDictionary
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread a core for 4x4 matrices
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -163,6 +162,41 @@ class Connection(Closing):
         rclpy.try_shutdown(context=self.context)
 
 
+class Nodes(Connection):
+    """Nodes of this process; in lockstep they hand each other their messages.
+
+    Parameters
+    ----------
+    makers : what makes each node, by its name; called with ``context`` and ``namespace``.
+    arguments, domain_id : as for `Connection`.
+    namespace : of the nodes.
+    is_stopped : no further node is made once it is true.
+
+    Attributes
+    ----------
+    nodes : the nodes by name.
+    """
+
+    def __init__(
+        self,
+        makers: Mapping[str, MakeNode],
+        arguments: Sequence[str],
+        namespace: str = NAMESPACE,
+        domain_id: int | None = None,
+        is_stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__(arguments, domain_id)
+        BUSES[self.context] = LocalBus(self.executor, makers)
+        self.nodes: dict[str, Any] = {}
+        try:
+            for name, make in makers.items():
+                if not is_stopped():
+                    self.nodes[name] = self.add(make(context=self.context, namespace=namespace))
+        except BaseException:
+            self.close()
+            raise
+
+
 def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) -> None:
     """Run nodes as this process, until SIGINT, SIGTERM or until the attribute `done` of one is true.
 
@@ -180,15 +214,13 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     stop = Stop()
     given = list(sys.argv if arguments is None else arguments)
     try:
-        connection = Connection(given)
+        connection = Nodes(makers, given)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
-    except RuntimeError as error:
+    except RuntimeError as error:  # also security that is enforced where the middleware has none
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
-    signal.signal(LISTENER_GONE, lambda *_: setattr(connection, "listener_gone", True))
-    BUSES[connection.context] = LocalBus(connection.executor, makers)
-    nodes: dict[str, Node] = {}
+    nodes = connection.nodes
 
     def end() -> None:
         # where the driver puts the brakes on, no other node has to report that it ends
@@ -199,22 +231,14 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     def is_over() -> bool:
         return stop.is_set or any(getattr(node, "done", False) for node in nodes.values())
 
-    try:
-        for name, make in makers.items():
-            nodes[name] = make(context=connection.context, namespace=NAMESPACE)
-            connection.add(nodes[name])
+    with connection:
+        signal.signal(LISTENER_GONE, lambda *_: setattr(connection, "listener_gone", True))
         keep_to_processors(os.environ)  # all threads are there
         for node in nodes.values():
             getattr(node, "raise_priority", lambda: None)()
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         connection.spin(is_over, end)
         bound_leaving(connection.context, lambda: _failure(nodes.values()))
-    except ParameterError as error:
-        raise SystemExit(f"error: {error}") from None
-    except RCLError as error:  # for example security that is enforced where the middleware has none
-        raise SystemExit(f"error: {str(error).split(', at /')[0]}") from None
-    finally:
-        connection.close()
     if reason := _failure(nodes.values()):
         raise SystemExit(f"error: {reason}")
 

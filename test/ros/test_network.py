@@ -363,4 +363,4 @@ def test_enforced_security_without_the_middleware_s_part_for_it_ends_a_node_in_o
     text = said(process)
     assert process.returncode == 1
     assert "Traceback" not in text, text
-    assert "error: error creating node: This Fast DDS version doesn't have the security libraries" in text, text
+    assert ": error creating node: This Fast DDS version doesn't have the security libraries" in text, text
