@@ -61,7 +61,13 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration.with_nodes(*extra)
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
-        load_for(configuration, given.scenario)  # refused before any node starts
+        steps = load_for(configuration, given.scenario)  # refused before any node starts
+        pushing = next((step.name for step in steps if step.push), "")
+        if pushing and not configuration.shared.is_simulated:
+            raise ValueError(
+                f"{given.scenario}: step '{pushing}' has a push, which the driver of this arm does not take; leave out "
+                "the key push, and push by hand"
+            )
     import_nodes(configuration, given)
     stop = Stop()
     processes = processes_of(configuration, given)
