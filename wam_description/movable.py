@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from wam_description.parameters import empty, named, parameter, require, rows
 
@@ -10,10 +10,22 @@ BOX = {"box": 3}  # numbers that the size of a shape needs
 BODY_SHAPES = {**BOX, "cylinder": 2, "ball": 1}
 
 
+class Countable:
+    """Lists of which a row counts where one of its values is above 0."""
+
+    counted_by: ClassVar[str]
+
+    @property
+    def present(self) -> list[Any]:
+        """The rows that count."""
+        return [one for one in rows(self) if getattr(one, self.counted_by) > 0.0]
+
+
 @dataclass(frozen=True)
-class FreeBodies:
+class FreeBodies(Countable):
     """Rigid bodies that lie, slide, roll and tip; they touch covers, obstacles, doors and each other."""
 
+    counted_by = "mass"
     names: tuple[str, ...] = parameter("names of the free bodies")
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(BODY_SHAPES))
     sizes: tuple[float, ...] = parameter(
@@ -47,19 +59,15 @@ class FreeBodies:
     def __post_init__(self) -> None:
         require_solids("world.bodies", self, BODY_SHAPES)
 
-    @property
-    def present(self) -> list[Any]:
-        """The bodies that have a mass."""
-        return [body for body in rows(self) if body.mass > 0.0]
-
 
 @dataclass(frozen=True)
-class Doors:
+class Doors(Countable):
     """Flat boxes on a hinge with friction and a spring; they touch covers and free bodies.
 
     The hinge turns about z of a frame at `positions`; at angle 0 the panel reaches along x from there.
     """
 
+    counted_by = "mass"
     names: tuple[str, ...] = parameter("names of the doors")
     positions: tuple[float, ...] = parameter(
         "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
@@ -93,19 +101,15 @@ class Doors:
                 "between",
             )
 
-    @property
-    def present(self) -> list[Any]:
-        """The doors that have a mass."""
-        return [door for door in rows(self) if door.mass > 0.0]
-
 
 @dataclass(frozen=True)
-class Motions:
+class Motions(Countable):
     """Given motions of obstacles: at + amplitude sin(2 pi f (t - begin)), whatever pushes against them.
 
     The amplitude grows smoothly during the first quarter of a period, so that nothing is hit by a velocity that jumps.
     """
 
+    counted_by = "frequency"
     obstacles: tuple[str, ...] = parameter("obstacles that move")
     amplitude: tuple[float, ...] = parameter(
         "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0, width=3
@@ -115,11 +119,6 @@ class Motions:
 
     def __post_init__(self) -> None:
         named("world.motions", self)
-
-    @property
-    def present(self) -> list[Any]:
-        """The motions that have a frequency."""
-        return [motion for motion in rows(self) if motion.frequency > 0.0]
 
 
 def principal_inertia(shape: str, size: Sequence[float], mass: float) -> tuple[float, float, float]:

@@ -1,9 +1,19 @@
 """What the arm can touch: obstacles, springs, pushers, and what it can move."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from wam_description.movable import BOX, NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions, require_solids
+from wam_description.movable import (
+    BOX,
+    NO_BODIES,
+    NO_DOORS,
+    NO_MOTIONS,
+    Countable,
+    Doors,
+    FreeBodies,
+    Motions,
+    require_solids,
+)
 from wam_description.parameters import aligned, empty, option, parameter, require, rows
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
@@ -40,9 +50,10 @@ class Obstacles:
 
 
 @dataclass(frozen=True)
-class Springs:
+class Springs(Countable):
     """Springs that push on the lever of a joint, like the one under the tip of the testbed (section 5.6)."""
 
+    counted_by = "stiffness"
     joints: tuple[str, ...] = parameter("joint of each spring")
     stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", high=1e9)
     lever: tuple[float, ...] = parameter("distance of the spring from the axis of the joint", "m", low=1e-3, high=3.0)
@@ -52,11 +63,6 @@ class Springs:
     def __post_init__(self) -> None:
         aligned("world.springs", self.joints, self)
 
-    @property
-    def present(self) -> list[Any]:
-        """The springs that have a stiffness."""
-        return [spring for spring in rows(self) if spring.stiffness > 0.0]
-
 
 NO_SPRINGS = empty(Springs)
 
@@ -65,7 +71,7 @@ PUSHER_SHAPES = {"sphere": 1, **BOX}
 
 
 @dataclass(frozen=True)
-class Pushers:
+class Pushers(Countable):
     """Hands that follow a moving link and press on it: rigid bodies with a soft surface, moved by the simulator.
 
     Each approaches from `clearance`, presses with its force from `begin` to `end` (s since power-up), moves
@@ -73,6 +79,7 @@ class Pushers:
     contact force is on `sim/contact/wrench`.
     """
 
+    counted_by = "force"
     names: tuple[str, ...] = parameter("names of the pushers")
     shapes: tuple[str, ...] = parameter("shape of each; a box presses with its flat side", choices=tuple(PUSHER_SHAPES))
     sizes: tuple[float, ...] = parameter(
@@ -109,11 +116,6 @@ class Pushers:
                 f"{one.name}: world.pushers.end is {one.end:g} s; it must be at least twice the rise after "
                 f"begin, {least:g} s",
             )
-
-    @property
-    def present(self) -> list[Any]:
-        """The pushers that have a force."""
-        return [pusher for pusher in rows(self) if pusher.force > 0.0]
 
 
 @dataclass(frozen=True)

@@ -130,10 +130,10 @@ class CableCircuits:
 
     @property
     def after_step(self) -> Callable[[Sequence[int], Sequence[float]], bool] | None:
-        """What has to follow each step, `follow` or as much of it as there is to do; None for nothing."""
+        """What has to follow each step; None for nothing."""
         if self.is_bounded:
             return self._follow_bounded
-        return self.follow if self._friction_counts else self._creeping() if self.depends_on_torque else None
+        return self.follow if self.depends_on_torque else None
 
     def _follow_bounded(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """`follow` for cables that end on both pulleys, or slip as a whole at the capstan's limit (6.16)."""
@@ -161,20 +161,6 @@ class CableCircuits:
                 slipped = math.copysign(abs(after) - limit, after) / circuit.stiffness
                 self._slack_ends[first] -= slipped
                 self._slack_ends[second] -= slipped
-
-    def _creeping(self) -> Callable[[Sequence[int], Sequence[float]], bool]:
-        """`follow` where slack strands do not count; what each step would look up again costs 1 % of it."""
-        each, ends, pulls = self.each, self._slack_ends, self._pulls
-
-        def creep(direction: Sequence[int], speeds: Sequence[float]) -> bool:
-            for (first, second, rate, _), way, speed, pull in zip(each, direction, speeds, pulls()):  # noqa: B905
-                if way:
-                    crept = rate * (speed if speed >= 0.0 else -speed) * pull
-                    ends[first] -= crept
-                    ends[second] -= crept
-            return False
-
-        return creep
 
     def follow(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.

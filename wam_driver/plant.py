@@ -24,6 +24,7 @@ from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import each
 from wam_description.signals import Load, ObjectState
+from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
 from wam_driver.compiled_steps import compiled_steps
@@ -114,7 +115,7 @@ class Plant:
         n = self._n = len(arm.motors.names)
         self._brakes, self._effects = [brake_torque] * n, effects
         self._arm, self._carried = arm, 0.0
-        self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
+        self._motor_from_joint = TransmissionMap.of(arm).motor_from_joint
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)

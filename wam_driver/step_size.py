@@ -18,6 +18,7 @@ from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError, rows
+from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.loads import half_lengths
 from wam_driver.thresholds import PLANT
@@ -80,8 +81,7 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     """The arm alone, then with each cover pressed on each surface, at the start and with all joints at 0."""
     n = len(arm.joints.names)
     data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    ratios = -np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))
-    cables = np.hstack([np.eye(n), ratios, np.zeros((n, model.nv - 2 * n))])
+    cables = np.hstack([np.eye(n), -TransmissionMap.of(arm).motor_from_joint, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
     damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)
     for spring in world.springs.present:

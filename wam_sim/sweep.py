@@ -3,9 +3,7 @@
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from itertools import groupby, product
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +15,6 @@ from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.wiring import raised
-from wam_sim.batch import Report, results
 from wam_sim.bus import TopicValue
 from wam_sim.reactions import (
     BRIEF,
@@ -240,10 +237,3 @@ def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: Topic
     )
     size = float(np.linalg.norm(force))
     return size + float(force @ acting) / size
-
-
-def sweep(
-    runs: Sequence[SweepPoint], executor: Executor, file: Path | None = None, report: Report | None = None
-) -> list[SweepResult]:
-    """The result of each run, in order; finished ones are kept in the file, see `wam_sim.batch.results`."""
-    return results(outcome, runs, executor, file, report)

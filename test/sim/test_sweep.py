@@ -11,7 +11,8 @@ from wam_cli.main import main
 from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
-from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points, sweep
+from wam_sim.batch import results
+from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points
 from wam_studies.thesis import definition, sweeping
 
 GAIN = "force_loop:force_gain"
@@ -162,13 +163,13 @@ def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
 def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
     given = runs(script, (0.004, 0.02, -1.0))
     with ThreadPoolExecutor(1) as one:
-        found = sweep(given, one, tmp_path / "kept.jsonl")
+        found = results(outcome, given, one, tmp_path / "kept.jsonl")
     assert [bool(result.failure) for result in found] == [False, False, True]
     assert found[2].failure
     assert found[0].force_rms > found[1].force_rms, "a small gain is slower"
     again: list[tuple[int, int]] = []
     with ThreadPoolExecutor(1) as one:
-        kept = sweep(given, one, tmp_path / "kept.jsonl", lambda done, of: again.append((done, of)))
+        kept = results(outcome, given, one, tmp_path / "kept.jsonl", lambda done, of: again.append((done, of)))
     assert again == [(3, 3)]
     assert kept[:2] == found[:2]
 

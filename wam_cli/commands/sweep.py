@@ -32,7 +32,7 @@ from wam_description import yaml_text
 from wam_description.configuration import option_values
 from wam_description.thresholds import FILES
 from wam_sim.batch import results
-from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, points, sweep
+from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, outcome, points
 from wam_studies.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_studies.thesis import definition, sweeping
 
@@ -121,7 +121,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tup
     runs = points(configuration, load(script_file(given.scenario or SCENARIO), configuration.shared), axes, sets)
     with batch_of(given, len(runs)) as batch:
         is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
-        found = sweep(runs, batch.executor, None if is_own else batch.file, batch.report)
+        found = results(outcome, runs, batch.executor, None if is_own else batch.file, batch.report)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
         scenario_figure(given.picture, axes, sets, found)
