@@ -521,10 +521,11 @@ def test_a_task_is_the_same_after_it_was_a_table() -> None:
     ("column", "value", "reason"),
     [
         (0, 9.0, "kind is 9; allowed: 1 force"),
-        (1, 0.0, "joint is 0 and link 1"),
+        (1, 0.0, "joint is 0, cover 'outer_link'.*give a joint alone, 0 to 3, or"),
         (2, 7.0, "link is 7; allowed: 0 to 1"),
         (3, 2.0, "contact_position is 2.0 m; allowed: 0 to 0.4064"),
-        (6, 0.0, "direction is zero"),
+        (6, 0.0, "along is .*; give a direction that is not zero"),
+        (8, math.nan, "rate is nan; it must be a finite number"),
         (7, math.nan, "value is not a number"),
         (8, 0.1, "rate is 0.1; it is for a position"),
         (9, 5.0, "stiffness and damping are for an impedance only"),

@@ -8,8 +8,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from wam_control.task.scenario_values import is_one_of, number, numbers
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, require, tunable
 from wam_description.signals import BASE, ZERO, Table, Triple
@@ -160,43 +161,53 @@ def is_pressing(table: Table) -> bool:
 
 
 def _axis(where: str, row: Sequence[float], arm: Arm) -> TaskAxis:
-    number, joint, link, place, x, y, z, value, rate, stiffness, damping = row
+    kind, joint, link, place, x, y, z, value, rate, stiffness, damping = row
+    kinds, covers = tuple(AxisKind), arm.covers.names
     require(
-        number in tuple(AxisKind),
-        f"{where}: kind is {number:g}; allowed: {', '.join(f'{k.value} {k.name.lower()}' for k in AxisKind)}",
+        kind in kinds, f"{where}: kind is {kind:g}; allowed: {', '.join(f'{k.value} {k.name.lower()}' for k in kinds)}"
     )
-    kind = AxisKind(int(number))
-    joints, covers = arm.joints.names, arm.covers
-    wanted = None if math.isnan(value) else value
-    motion = (wanted, rate, stiffness, damping)
-    if joint != -1:
-        require(
-            joint in range(len(joints)) and link == -1,
-            f"{where}: joint is {joint:g} and link {link:g}; allowed: joint 0 to {len(joints) - 1} with link -1, or "
-            "joint -1 with a link",
-        )
-        return checked(where, TaskAxis(kind, int(joint), "", 0.0, ZERO, *motion), arm)
     require(
-        link in range(len(covers.names)),
-        f"{where}: link is {link:g}; allowed: 0 to {len(covers.names) - 1}, for {', '.join(covers.names)}",
+        link in range(-1, len(covers)),
+        f"{where}: link is {link:g}; allowed: 0 to {len(covers) - 1}, for {', '.join(covers)}, or -1 with a joint",
     )
-    require(math.hypot(x, y, z) > 0.0, f"{where}: the direction is zero; give one that is not")
-    where_on = None if math.isnan(place) else place
-    return checked(where, TaskAxis(kind, -1, covers.names[int(link)], where_on, unit((x, y, z)), *motion), arm)
+    wanted, whole = None if math.isnan(value) else value, int(joint) if joint.is_integer() else joint
+    at: tuple[Any, ...] = ("", 0.0, ZERO)  # of a joint, whatever these columns are
+    if link >= 0 or joint == -1:
+        at = covers[int(link)] if link >= 0 else "", None if math.isnan(place) else place, (x, y, z)
+    given: tuple[Any, ...] = (whole, *at, wanted, rate, stiffness, damping)
+    axis = checked(where, TaskAxis(AxisKind(int(kind)), *given), arm)
+    return axis if axis.joint >= 0 else axis._replace(direction=unit(axis.direction))
 
 
 def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
-    """An axis as it is, or refused.
+    """An axis of a message, of a file or made in Python as it is, or refused.
 
     Raises
     ------
     ParameterError
         names the value that is not allowed.
     """
-    is_place = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE)
+    require(isinstance(axis, TaskAxis), f"{where} is {axis!r}; give a TaskAxis")
+    require(isinstance(axis.kind, AxisKind), f"{where}: kind is {axis.kind!r}; give an AxisKind")
+    for key in ("rate", "stiffness", "damping"):
+        number(where, key, getattr(axis, key))
+    is_place, is_joint = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE), axis.joint != -1
+    direction, joints = numbers(where, "along", axis.direction, 3), arm.joints
     require(
         axis.value is not None or is_place,
         f"{where}: value is not a number; give one, only that of a position or an impedance may be left out",
+    )
+    if axis.value is not None:
+        number(where, "value", axis.value)
+    if axis.position is not None:
+        number(where, "contact_position", axis.position)
+    require(
+        isinstance(axis.joint, int)
+        and not isinstance(axis.joint, bool)
+        and axis.joint in range(-1, len(joints.names))
+        and (not is_joint or (axis.cover, axis.position, any(direction)) == ("", 0.0, False)),
+        f"{where}: joint is {axis.joint!r}, cover {axis.cover!r}, contact_position {axis.position}, along {direction}; "
+        f"give a joint alone, 0 to {len(joints.names) - 1}, or joint -1 and a cover with position and direction",
     )
     require(
         axis.kind is AxisKind.IMPEDANCE or not (axis.stiffness or axis.damping),
@@ -210,14 +221,15 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         axis.rate == 0.0 or is_place,
         f"{where}: rate is {axis.rate:g}; it is for a position or an impedance only: leave it out",
     )
-    if axis.joint >= 0:
-        low, high = arm.joints.lower[axis.joint], arm.joints.upper[axis.joint]
+    if is_joint:
+        low, high = joints.lower[axis.joint], joints.upper[axis.joint]
         require(
             not is_place or axis.value is None or low <= axis.value <= high or not _is_held(axis),
-            f"{where}: {arm.joints.names[axis.joint]} is to be at {axis.value} rad; allowed: {low:.4g} to {high:.4g}",
+            f"{where}: {joints.names[axis.joint]} is to be at {axis.value} rad; allowed: {low:.4g} to {high:.4g}",
         )
         return axis
-    length = arm.covers.length_of(axis.cover)
+    require(any(direction), f"{where}: along is {direction}; give a direction that is not zero")
+    length = arm.covers.length_of(known_cover(where, axis.cover, arm))
     require(
         axis.position is not None or axis.is_sensed,
         f"{where}: contact_position is missing; it is estimated for a force only",
@@ -227,6 +239,13 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         f"{where}: contact_position is {axis.position} m; allowed: 0 to {length:g} m, on {axis.cover}",
     )
     return axis
+
+
+def known_cover(where: str, name: Any, arm: Arm) -> str:
+    """The name of a cover, or refused."""
+    if not is_one_of(name, arm.covers.names):
+        raise ParameterError(f"{where}: cover is {name!r}; allowed: {', '.join(arm.covers.names)}")
+    return str(name)
 
 
 def checked_task(task: TaskCommand, where: str = "") -> TaskCommand:

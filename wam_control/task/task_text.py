@@ -19,11 +19,21 @@ from typing import Any, Final
 
 import pinocchio as pin
 
-from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
-from wam_control.task.scenario_values import frame, is_one_of, known, number, numbers, plain, require_list, triple
+from wam_control.force.task import (
+    AxisKind,
+    TaskAxis,
+    TaskCommand,
+    checked,
+    checked_task,
+    joint_axes,
+    known_cover,
+    line_axes,
+    unit,
+)
+from wam_control.task.scenario_values import frame, known, number, numbers, plain, require_list, triple
 from wam_description.arm import Arm
-from wam_description.parameters import ParameterError, require
-from wam_description.signals import BASE, Triple
+from wam_description.parameters import require
+from wam_description.signals import BASE, ZERO, Triple
 
 PARTS: Final = ("start_side", "start_up", "end_side", "end_up")  # of a line: where, and which way across it
 HERE: Final = "here"
@@ -69,42 +79,13 @@ def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
     frame(where, task.frame, arm)
     require(len(task.axes) > 0, f"{where}: the task has no axes; give at least one, or no task")
     for i, axis in enumerate(task.axes):
-        _require_axis(f"{where}, axis {i + 1}", axis, arm)
+        checked(f"{where}, axis {i + 1}", axis, arm)
     checked_task(task, where)
 
 
 def as_of_file(task: TaskCommand) -> TaskCommand:
     """A task that was made in Python with tuples and floats as one of a file has them."""
     return task._replace(axes=tuple(plain(axis)._replace(kind=axis.kind, joint=axis.joint) for axis in task.axes))
-
-
-def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
-    """Refuse what no axis of a file can have, then what is not allowed."""
-    require(isinstance(axis, TaskAxis), f"{where} is {axis!r}; give a TaskAxis")
-    require(isinstance(axis.kind, AxisKind), f"{where}: kind is {axis.kind!r}; give an AxisKind")
-    for key in ("rate", "stiffness", "damping"):
-        number(where, key, getattr(axis, key))
-    if axis.value is not None:
-        number(where, "value", axis.value)
-    joints = arm.joints.names
-    is_whole = isinstance(axis.joint, int) and not isinstance(axis.joint, bool)
-    require(
-        is_whole and axis.joint in range(-1, len(joints)),
-        f"{where}: joint is {axis.joint!r}; allowed: -1 to {len(joints) - 1}, a whole number",
-    )
-    if axis.joint >= 0:
-        place, direction = number(where, "position", axis.position), numbers(where, "direction", axis.direction, 3)
-        require(
-            axis.cover == "" and not place and not any(direction),
-            f"{where}: joint is {axis.joint}, cover {axis.cover!r}, position {place:g}, direction {direction}; give a "
-            "joint alone, or a link with position and direction",
-        )
-    else:
-        _cover(where, axis.cover, arm)
-        if axis.position is not None:
-            number(where, "contact_position", axis.position)
-        _direction(where, axis.direction)
-    checked(where, axis, arm)
 
 
 def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
@@ -120,7 +101,7 @@ def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
 def _line(where: str, body: Mapping[str, Any], own: str, arm: Arm) -> list[TaskAxis]:
     known(where, body, ("line", "point", "along", "hold"), ("line", "point", "along"))
     require(own == BASE, f"{where}: the frame of the task is {own}; a line needs the frame base")
-    cover = _cover(where, body["line"], arm)
+    cover = known_cover(where, body["line"], arm)
     held = body.get("hold", list(PARTS))
     require(
         isinstance(held, list) and len(held) > 0 and all(part in PARTS for part in held),
@@ -141,24 +122,14 @@ def _axis(where: str, body: Mapping[str, Any], rotation: Any, arm: Arm) -> TaskA
     kind = AxisKind.IMPEDANCE if name == "free" else AxisKind[name.upper()]
     value = None if body[name] == HERE or name == "free" else number(where, name, body[name])
     damping = body[name] if name == "free" else body.get("damping", 0.0)
-    stiffness, rate = (number(where, key, body.get(key, 0.0)) for key in ("stiffness", "rate"))
-    motion = (value, rate, stiffness, number(where, "damping", damping))
+    motion = (value, body.get("rate", 0.0), body.get("stiffness", 0.0), damping)
     if is_joint:
         names = arm.joints.names
         require(body["joint"] in names, f"{where}: joint is {body['joint']!r}; allowed: {', '.join(names)}")
-        return checked(where, TaskAxis(kind, names.index(body["joint"]), "", 0.0, (0.0, 0.0, 0.0), *motion), arm)
-    cover = _cover(where, body["cover"], arm)
-    place = (
-        None if body["contact_position"] == ESTIMATED else number(where, "contact_position", body["contact_position"])
-    )
+        return checked(where, TaskAxis(kind, names.index(body["joint"]), "", 0.0, ZERO, *motion), arm)
+    place = None if body["contact_position"] == ESTIMATED else body["contact_position"]
     x, y, z = (rotation @ _direction(where, body["along"])).tolist()
-    return checked(where, TaskAxis(kind, -1, cover, place, (x, y, z), *motion), arm)
-
-
-def _cover(where: str, name: Any, arm: Arm) -> str:
-    if not is_one_of(name, arm.covers.names):
-        raise ParameterError(f"{where}: cover is {name!r}; allowed: {', '.join(arm.covers.names)}")
-    return str(name)
+    return checked(where, TaskAxis(kind, -1, body["cover"], place, (x, y, z), *motion), arm)
 
 
 def _direction(where: str, body: Any) -> Triple:
