@@ -137,24 +137,16 @@ def _faces(shape: str, size: Numbers, rotation: Numbers, centre: Numbers, colour
 
 
 def _corners(shape: str, size: Numbers) -> Iterator[tuple[Numbers, Numbers]]:
-    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    if shape == "plane":
-        yield np.column_stack([square * size[:2], np.zeros(4)]), np.array([0.0, 0.0, 1.0])
-    elif shape == "box":
-        for axis in range(3):
-            others = [k for k in range(3) if k != axis]
-            for sign in (-1.0, 1.0):
-                corners = np.full((4, 3), sign * size[axis])
-                corners[:, others] = square * size[others]
-                yield corners, sign * np.eye(3)[axis]
-    else:
-        angles = np.linspace(0.0, 2.0 * math.pi, 49)
-        ring = np.column_stack([np.cos(angles), np.sin(angles)]) * size[0]
-        for sign in (-1.0, 1.0):
-            yield np.column_stack([ring, np.full(49, sign * size[1])]), np.array([0.0, 0.0, sign])
-        for a, b in itertools.pairwise(ring):
-            corners = np.array([[*a, -size[1]], [*b, -size[1]], [*b, size[1]], [*a, size[1]]])
-            yield corners, np.array([*(a + b), 0.0]) / np.linalg.norm(a + b)
+    """Corners and outward normal of each face: a plane, or a prism over a square or a circle."""
+    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * size[:2]
+    angles = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
+    round_ring = size[0] * np.column_stack([np.cos(angles), np.sin(angles)])
+    ring, half = (round_ring, size[1]) if shape == "cylinder" else (square, 0.0 if shape == "plane" else size[2])
+    for sign in (1.0,) if shape == "plane" else (-1.0, 1.0):
+        yield np.column_stack([ring, np.full(len(ring), sign * half)]), np.array([0.0, 0.0, sign])
+    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True) if half else ():
+        along = (b - a) / np.linalg.norm(b - a)
+        yield np.array([[*a, -half], [*b, -half], [*b, half], [*a, half]]), np.array([along[1], -along[0], 0.0])
 
 
 def side_view(

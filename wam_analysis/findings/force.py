@@ -240,21 +240,18 @@ def _words(seen: Swings) -> str:
 def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
     name, cycle = one.hold.name, one.cycle
     seen = cycle.confidence >= CYCLE.sure
-    force = period = soft_force = soft_period = math.nan
+    force = period = math.nan
     note = ""
     if predicted is not None:
         if math.isfinite(predicted.period):
             force, period = predicted.force_peak_to_peak, predicted.period
-        soft_force, soft_period = predicted.driven_peak_to_peak, predicted.driven_period
         note = "(5.8), (5.9) corrected" + "; (5.11) is not small, so they are approximate" * (not predicted.is_certain)
         is_long = predicted.period * CYCLE.cycles > CYCLE.late_part * (one.hold.end - one.hold.begin) / 1e9
         note += "; too long for this recording" * is_long
-    soft = f"with the velocity loops in series, {shown(soft_force, 'N')}; " if math.isfinite(soft_force) else ""
-    slow = f"with the velocity loops in series, {shown(soft_period, 's')}" if math.isfinite(soft_period) else ""
     size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3
     return [
-        Finding(f"{name}: limit cycle, peak to peak", "N", size, force, soft + note),
-        Finding(f"{name}: period of the limit cycle", "s", time, period, slow),
+        Finding(f"{name}: limit cycle, peak to peak", "N", size, force, note),
+        Finding(f"{name}: period of the limit cycle", "s", time, period),
         Finding(f"{name}: confidence of the limit cycle", "", sure),
         *(found._replace(name=f"{name}: {found.name}") for found in (one.swinging.findings if one.swinging else ())),
     ]

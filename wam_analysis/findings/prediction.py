@@ -26,8 +26,6 @@ class Node(NamedTuple):
     Attributes
     ----------
     transmission_stiffness, contact_stiffness : k_tr, k_c, N/m; k_c NaN if the surface is not known.
-    driven_stiffness : k_tr in series with the velocity loops, N/m; NaN if they are not known.  The integral term
-        of a velocity loop acts as a spring about the commanded path.
     inertia : J_l, kg, of the joint side.
     damping : b, N s/m, of joints, cables and surface together; the motor is taken as slow.
     static_friction, dynamic_friction : N.
@@ -35,7 +33,6 @@ class Node(NamedTuple):
     """
 
     transmission_stiffness: float
-    driven_stiffness: float
     contact_stiffness: float
     inertia: float
     damping: float
@@ -53,7 +50,6 @@ class Predicted(NamedTuple):
     force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected.
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
     is_certain : whether (5.11) is small enough for (5.8), (5.9).
-    driven_peak_to_peak, driven_period : (5.8), (5.9) with the velocity loops in series with the cables.
     """
 
     time_constant: float
@@ -61,8 +57,6 @@ class Predicted(NamedTuple):
     period: float
     actuator_peak_to_peak: float
     is_certain: bool
-    driven_peak_to_peak: float
-    driven_period: float
 
 
 def node_at(
@@ -72,7 +66,7 @@ def node_at(
 
     Parameters
     ----------
-    recorded : for the surface and the velocity loops.
+    recorded : for the surface.
     arm : the arm.
     q : (n,), rad.
     cover, position : of the contact, m.
@@ -94,7 +88,6 @@ def node_at(
     surface = _surface(recorded, arm, cover, position)
     return Node(
         transmission_stiffness=1.0 / gives,
-        driven_stiffness=1.0 / (gives + _servo_compliance(recorded, ratio, along)),
         contact_stiffness=surface.stiffness,
         inertia=1.0 / float(along @ np.linalg.solve(inertia, along)),
         damping=float(np.array(arm.joints.viscous_friction) @ moves**2 + cables @ (ratio @ moves) ** 2)
@@ -103,14 +96,6 @@ def node_at(
         dynamic_friction=float(np.array(arm.joints.dynamic_friction) @ np.abs(moves)),
         joint_per_metre=moves,
     )
-
-
-def _servo_compliance(recorded: PredictionParameters, ratio: Numbers, along: Numbers) -> float:
-    """Compliance of the velocity loops along the force, m/N."""
-    servo = recorded.servo
-    if servo is None or not all(gain > 0.0 for gain in servo.integral_gain):
-        return math.nan
-    return float(along @ np.linalg.solve(ratio.T @ np.diag(servo.integral_gain) @ ratio, along))
 
 
 class _Surface(NamedTuple):
@@ -143,22 +128,16 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
         nan = math.nan
-        return Predicted(nan, nan, nan, nan, False, nan, nan)
+        return Predicted(nan, nan, nan, nan, False)
     fs, fd = node.static_friction, node.dynamic_friction
     zeta = float(linear_loop.damping_ratio(j, b, ktr, kc))
     gamma = float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain))
-
-    def cycle(stiffness: float) -> tuple[float, float]:
-        """Size, N, and period, s, of the stiction cycle with a stiffness between motor and joint."""
-        damped = float(linear_loop.damping_ratio(j, b, stiffness, kc))
-        size = stiction.stiction_cycle_force(stiffness, kc, fs, fd, damped)
-        return float(size), float(stiction.stiction_cycle_period(gain, stiffness, kc, fs, fd, damped))
-
-    driven = cycle(node.driven_stiffness) if math.isfinite(node.driven_stiffness) else (math.nan, math.nan)
+    size = float(stiction.stiction_cycle_force(ktr, kc, fs, fd, zeta))
+    period = float(stiction.stiction_cycle_period(gain, ktr, kc, fs, fd, zeta))
     certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
     actuator = float(regimes.actuator_cycle(fd, ktr, gamma, zeta))
     time_constant = float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc)))
-    return Predicted(time_constant, *cycle(ktr), actuator, certain, *driven)
+    return Predicted(time_constant, size, period, actuator, certain)
 
 
 class LargestForce(NamedTuple):
