@@ -712,14 +712,15 @@ def test_a_slow_ring_down_is_no_limit_cycle_in_any_of_its_parts(tau: float, tmp_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", ["triangle", "waves"])
+@pytest.mark.parametrize("way", ["triangle", "waves", "velocity"])
 def test_a_cycle_beside_a_commanded_motion_of_any_shape_is_found(way: str, tmp_path: Path) -> None:
     time = times(30.0)
 
     def path(at: Any) -> Any:
         return 0.8 / np.pi * np.arcsin(np.sin(2.0 * np.pi * 0.47 * at)) if way == "triangle" else 0.5 * swung(at, 95)[0]
 
-    sent = joints("/joint_command", time[::2], ["j"], position=path(time)[::2, np.newaxis])
+    said = {"velocity": 0.5 * swung(time, 95)[1]} if way == "velocity" else {"position": path(time)}
+    sent = joints("/joint_command", time[::2], ["j"], **{q: one[::2, np.newaxis] for q, one in said.items()})
     position = path(time - 0.03) + at_rest(time, ["j"], 96)[:, 0]
     for size in (0.006, 0.0):
         states = joints("/joint_states", time, ["j"], position=(position + sine(time, 8.7, size))[:, np.newaxis])

@@ -36,7 +36,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
     taken: set[str] = set()
     for one, quantity, label in traced(recording.states):
         unit, command = one.units[quantity], recording.command_of(one)
-        own = None if command is None else command.only(quantity)
+        own = None if command is None else command.only(quantity if quantity in command.values else "velocity")
         for piece in pieces(one, quantity):
             least = max(CYCLE.loud * piece.noise[quantity], LEAST.get(unit, 0.0))
             for found in _of_piece(piece, quantity, own, least):
@@ -129,11 +129,6 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
                 result.append(FoundCycle(one, LIMIT_CYCLE))
         else:
             result.append(FoundCycle(one, COMMANDED_CYCLE))
-            if rest is None:
-                inner = (piece.time >= one.begin) & (piece.time <= one.end)
-                left = _without(piece.time[inner], piece.values[quantity][inner], frequency)
-                others = episodes(piece.time[inner], left, least)
-                result += [FoundCycle(other, LIMIT_CYCLE) for other in others if not _is_harmonic(other, frequency)]
     if rest is None:
         return result
     for one in _found(piece, quantity, rest, least):
@@ -174,20 +169,18 @@ def _is_harmonic(one: Episode, frequency: float) -> bool:
 
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:
-    """A signal less what follows its command linearly, at once, late or slowly; None without a moving command."""
-    if (
-        quantity not in command.values
-        or len(command.time) < SHAFT.fewest_samples
-        or _begins_after(command, piece.time[0])
-    ):
+    """A signal less what follows a command, or the way of a commanded velocity, linearly; None where that is still."""
+    if len(command.time) < SHAFT.fewest_samples or _begins_after(command, piece.time[0]):
         return None
     if np.any(command.is_away(piece.time)):
         return None
-    desired = held(command, quantity, piece.time)
+    (known,) = command.values
+    desired = held(command, known, piece.time)
     if not np.ptp(desired) > 0.0:
         return None
-    between = np.interp(piece.time, command.time, command.values[quantity])  # of a path that is sent in points
-    rests = [_less(piece, piece.values[quantity], one) for one in (desired, between)]
+    between = np.interp(piece.time, command.time, command.values[known])  # of a path that is sent in points
+    paths = [one if known == quantity else np.cumsum(one) for one in (desired, between)]
+    rests = [_less(piece, piece.values[quantity], one) for one in paths]
     return min(rests, key=lambda rest: float(np.sum(rest**2)))
 
 
@@ -197,7 +190,7 @@ def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
     lags = np.unique(np.round(np.linspace(0.0, CYCLE.longest_lag / period, CYCLE.lags)).astype(np.int64))
     late = [np.concatenate([np.full(lag, desired[0]), desired[: len(desired) - lag]]) for lag in lags.tolist()]
     slow = [_slowed(desired, period / (period + tau)) for tau in CYCLE.command_filters]
-    columns = np.column_stack([np.ones(len(desired)), *late, *slow])
+    columns = np.column_stack([np.ones(len(desired)), piece.time - piece.time[0], *late, *slow])
     return value - columns @ np.linalg.lstsq(columns, value, rcond=CYCLE.singular)[0]
 
 
@@ -215,13 +208,12 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
     """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if it is not known."""
     if command is None or not len(command.time) or _begins_after(command, one.begin):
         return None
-    desired = quantity if quantity in command.values else next(iter(command.values))
+    (known,) = command.values
     time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
     if np.any(command.is_away(time)):
         return None
-    value = held(command, desired, time)
-    cycle = limit_cycle(time, value)
-    is_small = desired == quantity and cycle.peak_to_peak < CYCLE.commanded * one.cycle.peak_to_peak
+    cycle = limit_cycle(time, held(command, known, time))
+    is_small = known == quantity and cycle.peak_to_peak < CYCLE.commanded * one.cycle.peak_to_peak
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 
@@ -234,11 +226,3 @@ def _begins_after(command: Source, begin: float) -> bool:
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:
     """The last command before each of some times, before the first one that, (n,)."""
     return command.values[quantity][row_at(command.time, time)]
-
-
-def _without(time: Numbers, value: Numbers, frequency: float) -> Numbers:
-    """A signal less its mean, its drift and the harmonics of a frequency."""
-    most = min(CYCLE.harmonics, int(0.5 / (frequency * float(time[1] - time[0]))) - 1)
-    angles = 2.0 * np.pi * frequency * np.outer(time - time[0], np.arange(1, most + 1))
-    columns = np.column_stack([np.ones(len(time)), time - time[0], np.cos(angles), np.sin(angles)])
-    return value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]
