@@ -11,7 +11,7 @@ from wam_analysis.foreign.sources import Piece, Source, longest, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
-from wam_analysis.measures.lines import spectral_lines
+from wam_analysis.measures.lines import amplitude_at, spectral_lines
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
@@ -89,9 +89,10 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         begins.append(CYCLE.first_line / float(np.ptp(piece.time)))
         unit = one.units[quantity]
         for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines):
-            if 2.0 * line.amplitude > LEAST.get(unit, 0.0):
+            amplitude = amplitude_at(piece.stamps, piece.recorded[quantity], line.frequency)
+            if 2.0 * amplitude > LEAST.get(unit, 0.0):
                 name = f"{label}, {shown(line.frequency, 'Hz')}"
-                findings.append(Finding(f"{name}: amplitude", unit, line.amplitude))
+                findings.append(Finding(f"{name}: amplitude", unit, amplitude))
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))

@@ -441,7 +441,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
         stamps, recorded = time, values
         if float(np.max(np.abs(np.diff(time) - period))) > STREAM.irregular * period:
             even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
-            values = {q: at_times(even, time, v) for q, v in values.items()}
+            values = {q: np.interp(even, time, v) for q, v in values.items()}
             time = even
         sd = {q: resolution(v) for q, v in values.items()}
         if "position" in values and "velocity" not in values:
@@ -449,27 +449,6 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
             values["velocity"], sd["velocity"] = differentiated(time, values["position"])
         found.append(Piece(time, values, sd, stamps, recorded))
     return found
-
-
-def at_times(wanted: Numbers, time: Numbers, value: Numbers) -> Numbers:
-    """Values of a signal between its samples, which a line would cut the tops of a fast cycle off.
-
-    The parabola of an interval has the lesser curvature of those at its two ends, and none where they differ in sign:
-    a step is not overshot.
-
-    Parameters
-    ----------
-    wanted : (m,), s, within `time`.
-    time : (n,), s, rising.
-    value : (n,).
-    """
-    slope = np.diff(value) / np.diff(time)
-    bend = np.pad(np.diff(slope) / (time[2:] - time[:-2]), 1)
-    left, right = bend[:-1], bend[1:]
-    lesser = np.where(left * right > 0.0, np.sign(left) * np.minimum(np.abs(left), np.abs(right)), 0.0)
-    row = np.clip(np.searchsorted(time, wanted, side="right") - 1, 0, len(time) - 2)
-    after = wanted - time[row]
-    return value[row] + after * (slope[row] + lesser[row] * (wanted - time[row + 1]))
 
 
 def longest(some: list[Piece]) -> Piece | None:

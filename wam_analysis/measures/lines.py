@@ -33,7 +33,6 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     if n < CYCLE.window_samples or not np.ptp(value) > 0.0:
         return []
     frequencies, amplitude = amplitudes(time, value)
-    flat = _windowed(value)
     power = amplitude**2
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
@@ -50,25 +49,32 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
         frequency = (k + shift) * float(frequencies[1])
-        turns = np.exp(-2j * np.pi * frequency * (time - time[0]))
-        found.append(SpectralLine(frequency, float(4.0 * np.abs(np.sum(flat * turns)) / n)))
+        found.append(SpectralLine(frequency, amplitude_at(time, value, frequency)))
     return found
+
+
+def amplitude_at(time: Numbers, value: Numbers, frequency: float) -> float:
+    """Amplitude of a signal at a frequency, Hz; the times, (n,), s, rise, and need not be even."""
+    flat, window = _windowed(time, value)
+    turns, width = np.exp(-2j * np.pi * frequency * (time - time[0])), np.gradient(time)
+    return float(2.0 * np.abs(np.sum(flat * turns * width)) / np.sum(window * width))
 
 
 def amplitudes(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
     """Frequencies, (f,), Hz, from 0 on, and the amplitude of a signal at each, of a Hann window; arguments as above."""
     n = len(value)
     frequency = np.arange(n // 2 + 1) * (n - 1) / (n * float(time[-1] - time[0]))
-    amplitude: Numbers = 4.0 * np.abs(np.fft.rfft(_windowed(value))) / n
+    amplitude: Numbers = 4.0 * np.abs(np.fft.rfft(_windowed(time, value)[0])) / n
     return frequency, amplitude
 
 
-def _windowed(value: Numbers) -> Numbers:
-    """A signal less its line, in a Hann window, whose mean is a half."""
+def _windowed(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
+    """A signal less its line, in a Hann window, and this window, whose mean is a half."""
     n = len(value)
-    steps = np.linspace(-1.0, 1.0, n)
+    steps = (time - time[0]) / (time[-1] - time[0])
     flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
-    return flat * (0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n))
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (steps * (n - 1) + 0.5) / n)
+    return flat * window, window
 
 
 def _noise(power: Numbers, k: int) -> float:
