@@ -59,7 +59,7 @@ import moving_picture  # noqa: E402
 CONFIGURATION = ROOT / "config" / "wam.yaml"
 SAMPLES = ROOT / "bags" / "sample"
 CLAIMS = ROOT / "docs" / "thesis.yaml"
-WRITES_PICTURES = __name__ == "__main__"
+WRITES_PICTURES = __name__ == "__main__" and "--pages" not in sys.argv
 DITHER_CYCLE, DITHER_POSE = 40, (0.1, -0.9, 0.2, 0.9)  # periods; rad
 LISTED = 4  # elements of a list in the table of parameters
 CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")

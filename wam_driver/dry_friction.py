@@ -91,12 +91,16 @@ class DryFriction:
             (per_tension, circuit) for (per_tension, _), circuit in zip(self._circuits, circuits, strict=True)
         ]
         self._from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in self._circuits]
-        self.set_added(self._added)
+        self._renew_levels()
 
     def set_added(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
         self._added = tuple(friction)
-        self._extra = [*self._from_tension, *friction]
+        self._renew_levels()
+
+    def _renew_levels(self) -> None:
+        """Static and dynamic friction of each shaft, N m; those that vary in motion are computed in each step."""
+        self._extra = [*self._from_tension, *self._added]
         each = list(zip(self._laws, self._warm, self._extra, strict=True))
         self._static = [law.level(0.0, 0, 0.0) * warm + extra for law, warm, extra in each]
         self._dynamic = [law.level(1.0, 1, 0.0) * warm + extra for law, warm, extra in each]
@@ -107,7 +111,7 @@ class DryFriction:
         """Take the heat of each motor, (n,), 1 at its thermal limit, for friction that falls with temperature."""
         left = [1.0 - self._warm_drop * min(w, 1.0) for w in heat]
         self._warm[: len(left)] = left
-        self.set_added(self._added)
+        self._renew_levels()
 
     def follow(self, velocity: Sequence[float], load: Sequence[float] = (), held: Sequence[float] = ()) -> bool:
         """Bring `levels` and `elastic` up to date for the next step.
@@ -127,7 +131,7 @@ class DryFriction:
         for i, speed, low, high in zip(self._shafts, velocity, self._low, self._high):  # noqa: B905 - costs 1 % of a step
             if low < speed < high:
                 continue
-            way = 0 if self.direction[i] else 1 if speed > 0.0 else -1
+            way = 0 if self.direction[i] else 1 if speed > 0.0 else -1  # one that moved is stuck before it turns
             self.direction[i] = way
             self._low[i], self._high[i] = self._bounds[i][way]
             self.levels[i] = self._dynamic[i] if way else self._static[i]

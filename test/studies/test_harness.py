@@ -131,7 +131,7 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
 def test_every_study_names_a_page_that_has_its_section(name: str) -> None:
     kind = load(name)
     assert kind.title
-    assert section_of(ROOT / kind.page, name)
+    assert section_of(ROOT / kind.page, name), f"missing: wam evaluate {name} --write {kind.page} makes it"
 
 
 TO_TWO, TO_ONE = (0.0, 2.0), (0.0, 1.0)

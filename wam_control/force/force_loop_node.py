@@ -16,6 +16,7 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
+from wam_description.topics import FORCE_AXIS_COLUMNS
 from wam_description.wiring import Followed, Input, Outputs, reaction
 
 
@@ -134,18 +135,21 @@ class ForceLoopNode:
         axis, place = (out.axes[0].sensed, out.axes[0].place) if out.axes else (None, None)
         if axis is None or place is None:
             return {"force_axis": Table(BASE, ())}
-        known, lever = out.known[0], math.hypot(*axis.lever)
-        row = (
-            float(event.code.number),
-            float(event.holds),
-            known.doubt,
-            known.tolerance,
-            *known.errors,
-            known.sd,
-            lever,
-        )
-        sensed = (axis.apparent_mass, axis.speed_fraction, place.position, place.position_sd)
-        return {"force_axis": Table(place.cover, ((*row, *sensed),))}
+        known = out.known[0]
+        values = {
+            "event": float(event.code.number),
+            "holds": float(event.holds),
+            "doubt": known.doubt,
+            "tolerance": known.tolerance,
+            "force_sd": known.sd,
+            "lever": math.hypot(*axis.lever),
+            "apparent_mass": axis.apparent_mass,
+            "speed_fraction": axis.speed_fraction,
+            "position": place.position,
+            "position_sd": place.position_sd,
+            **known.errors._asdict(),
+        }
+        return {"force_axis": Table(place.cover, (tuple(values[name] for name in FORCE_AXIS_COLUMNS),))}
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
