@@ -120,20 +120,17 @@ def test_a_limit_cycle_of_the_testbed_is_found_with_its_size_and_its_period(cycl
 
 
 def test_its_prediction_from_the_recorded_parameters_stands_beside_it(cycling: Recorded) -> None:
-    """(5.8) by hand: Omega dF k_c/(k_tr + k_c) over the lever, for the cables and for cables and servo in series."""
+    """(5.8) by hand: Omega dF k_c/(k_tr + k_c) over the lever, for cables and servo in series."""
     found = cycling.finding("press: limit cycle, peak to peak")
     lever, contact, cable = 0.9144, 1751.26835 * 0.9144**2, 14.0**2 / (0.920992366 / (2 * 42258.1053 * 0.009525**2))
     servo = 14.0**2 * 2.0
     inertia = 1.62155 * 0.4572**2 + 0.112985
     damping = 3.74 + 14.0**2 * 1.83e-3
-    sizes = []
-    for stiffness in (cable, 1.0 / (1.0 / cable + 1.0 / servo)):
-        zeta = damping / (2.0 * math.sqrt(inertia * (stiffness + contact)))
-        omega = 1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2))
-        sizes.append(omega * 3.0 * contact / (stiffness + contact) / lever)
-    assert found.predicted == pytest.approx(sizes[0], rel=0.01)
-    assert f"in series, {sizes[1]:.3g} N" in found.note
-    assert found.measured == pytest.approx(sizes[1], rel=0.05)  # the motor's own friction is not in it
+    stiffness = 1.0 / (1.0 / cable + 1.0 / servo)
+    zeta = damping / (2.0 * math.sqrt(inertia * (stiffness + contact)))
+    omega = 1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2))
+    assert found.predicted == pytest.approx(omega * 3.0 * contact / (stiffness + contact) / lever, rel=0.01)
+    assert found.measured == pytest.approx(found.predicted, rel=0.05)  # the motor's own friction is not in it
 
 
 @pytest.mark.slow

@@ -245,7 +245,10 @@ def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding
     if predicted is not None:
         if math.isfinite(predicted.period):
             force, period = predicted.force_peak_to_peak, predicted.period
-        note = "(5.8), (5.9) corrected" + "; (5.11) is not small, so they are approximate" * (not predicted.is_certain)
+        note = (
+            "(5.8), (5.9) corrected, with the velocity loops in series with the cables"
+            + "; (5.11) is not small, so they are approximate" * (not predicted.is_certain)
+        )
         is_long = predicted.period * CYCLE.cycles > CYCLE.late_part * (one.hold.end - one.hold.begin) / 1e9
         note += "; too long for this recording" * is_long
     size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3

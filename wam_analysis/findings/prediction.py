@@ -28,11 +28,14 @@ class Node(NamedTuple):
     transmission_stiffness, contact_stiffness : k_tr, k_c, N/m; k_c NaN if the surface is not known.
     inertia : J_l, kg, of the joint side.
     damping : b, N s/m, of joints, cables and surface together; the motor is taken as slow.
+    driven_stiffness : k_tr in series with the velocity loops, N/m: the integral term of each acts as a spring about the
+        commanded path.  k_tr alone where they are not known.
     static_friction, dynamic_friction : N.
     joint_per_metre : (n,), dq/dx, rad/m.
     """
 
     transmission_stiffness: float
+    driven_stiffness: float
     contact_stiffness: float
     inertia: float
     damping: float
@@ -47,7 +50,7 @@ class Predicted(NamedTuple):
     Attributes
     ----------
     time_constant : of the frictionless loop, 1/(G_I K), s, (5.2).
-    force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected.
+    force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected, with the driven stiffness.
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
     is_certain : whether (5.11) is small enough for (5.8), (5.9).
     """
@@ -66,7 +69,7 @@ def node_at(
 
     Parameters
     ----------
-    recorded : for the surface.
+    recorded : for the surface and the velocity loops.
     arm : the arm.
     q : (n,), rad.
     cover, position : of the contact, m.
@@ -88,6 +91,7 @@ def node_at(
     surface = _surface(recorded, arm, cover, position)
     return Node(
         transmission_stiffness=1.0 / gives,
+        driven_stiffness=1.0 / (gives + _servo_compliance(recorded, ratio, along)),
         contact_stiffness=surface.stiffness,
         inertia=1.0 / float(along @ np.linalg.solve(inertia, along)),
         damping=float(np.array(arm.joints.viscous_friction) @ moves**2 + cables @ (ratio @ moves) ** 2)
@@ -96,6 +100,14 @@ def node_at(
         dynamic_friction=float(np.array(arm.joints.dynamic_friction) @ np.abs(moves)),
         joint_per_metre=moves,
     )
+
+
+def _servo_compliance(recorded: PredictionParameters, ratio: Numbers, along: Numbers) -> float:
+    """Compliance of the velocity loops along the force, m/N; 0 where they are not known."""
+    servo = recorded.servo
+    if servo is None or not all(gain > 0.0 for gain in servo.integral_gain):
+        return 0.0
+    return float(along @ np.linalg.solve(ratio.T @ np.diag(servo.integral_gain) @ ratio, along))
 
 
 class _Surface(NamedTuple):
@@ -132,8 +144,10 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     fs, fd = node.static_friction, node.dynamic_friction
     zeta = float(linear_loop.damping_ratio(j, b, ktr, kc))
     gamma = float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain))
-    size = float(stiction.stiction_cycle_force(ktr, kc, fs, fd, zeta))
-    period = float(stiction.stiction_cycle_period(gain, ktr, kc, fs, fd, zeta))
+    driven = node.driven_stiffness
+    damped = float(linear_loop.damping_ratio(j, b, driven, kc))
+    size = float(stiction.stiction_cycle_force(driven, kc, fs, fd, damped))
+    period = float(stiction.stiction_cycle_period(gain, driven, kc, fs, fd, damped))
     certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
     actuator = float(regimes.actuator_cycle(fd, ktr, gamma, zeta))
     time_constant = float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc)))
