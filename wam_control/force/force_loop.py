@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wam_control.force.advice import tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
-from wam_control.force.belief import Belief
+from wam_control.force.belief import Belief, WorldTorques
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import STEEPEST, ContactPlace, ForcePlace, pinned_position
 from wam_control.force.force_axis import ForceAxes
@@ -504,10 +504,10 @@ class ForceLoop:
                 allowed = min(allowed, own.limits.whole_force * pressed)
         now = torques.now - run.resting
         if torques.acceleration is not None:
-            now = now + self._axes.forces.inertia(self._q) @ torques.acceleration
+            now = now + self._axes.forces.inertia(self._q).dot(torques.acceleration)
         chi2 = max((one.known.chi2 for one in run.axes), default=0.0)
         gain = self._supervision.present * max(own.force_gain)
-        torques = torques._replace(now=now)
+        torques = WorldTorques(now, torques.before, torques.acceleration, torques.sd)
         return self._pushed.step(self._q, forces, torques, contact, chi2, allowed, bool(pressed), gain, own, dt)
 
     def _guarded(self, axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
