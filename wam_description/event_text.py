@@ -20,8 +20,8 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
     Reason.LINKS: "the torques do not identify the link",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the force may be parallel to this link: then the torques show neither its position, nor whether it "
-    "acts on this link or on the one before",
+    Reason.ALONG: "a force parallel to this link explains the torques, too; of such a force they show neither the "
+    "position nor the link",
     Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is 1 minus the sum of those "
     "of the links",
     Reason.TOO_EARLY: "too few samples so far",
@@ -36,7 +36,7 @@ RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g}
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": (
         "the measured torques",
-        "use joint sensors or the dither (timing.dither_cycle), or tare in free space",
+        "use joint sensors or the dither (timing.dither_cycle=40), or tare in free space",
     ),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),

@@ -36,7 +36,7 @@ from wam_sim.simulation import Simulation
 __all__ = ["IdentifiedModel", "analyse", "arm", "guard", "identify", "load", "read", "simulate"]
 
 Named = str | Path | Configuration
-ALWAYS = "always refuse here; a running stack has guard.mode limit and lowers values instead"
+ALWAYS = "assesses the gains as they are given; a running stack lowers those that are too large (guard.mode limit)"
 
 
 def load(name: str | Path = "wam", values: Mapping[str, Any] | None = None) -> Configuration:

@@ -693,7 +693,7 @@ def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
     facts = [("0.000", "0.0", "0"), ("1.000", "4.0", "0"), ("0.500", "20.4", "7"), ("1.000", "1.0", "7")]
     recording.timing = [{"real-time factor": f, "behind [ms]": b, "slips": n} for f, b, n in facts]
     found = told(recording.bag())
-    assert "real-time factor 0.75, at most 20 ms behind, slower than the wall clock in 7 places" in found
+    assert "real-time factor 0.75; the computer was late 7 times, by at most 20 ms" in found
 
 
 def test_contact_lies_on_the_surface_of_its_cover_on_the_side_that_is_pushed():

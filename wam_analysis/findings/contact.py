@@ -51,7 +51,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
                 note="norm of the error vector; without forces that are lower bounds",
             ),
         ]
-        shows.append(f"Contacts: correct link for {right:.0f} % of all contact time{_errors(away, off)}.")
+        shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
     if np.any(known):
         count = len(runs(traces.is_false))
         seconds = float(np.sum(traces.is_false)) * traces.period
@@ -102,8 +102,9 @@ def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Findi
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be a lower bound" * (not one.is_placed)
     yield Finding(f"{name}: error of the force's magnitude", "N", contact.force_error, note=least or unknown)
-    note = f"time until its detection, to within {1e3 * period:.0f} ms"
-    yield Finding(f"{name}: latency", "ms", 1e3 * (contact.latency + period), note=note)
+    is_early = contact.latency < 0.0
+    note = f"time until its detection, to within {1e3 * period:.0f} ms" if not is_early else "reported before it began"
+    yield Finding(f"{name}: latency", "ms", math.nan if is_early else 1e3 * (contact.latency + period), note=note)
 
 
 def _doubts(name: str, contact: ListedContact) -> Iterator[str]:

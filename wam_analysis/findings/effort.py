@@ -71,8 +71,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
     doubts += [RECORD] * bool(doubts)
     assumed = (
-        "The fit explains the effort by friction and inertia. Where they explain more, it includes the joint's weight, "
-        "a drag by the square of the velocity, and a delay. What it leaves out makes the standard errors larger."
+        "The effort is explained by friction and inertia. The joint's weight, a drag by the square of the velocity and "
+        "a delay are added if they explain more. What is left makes the standard errors larger."
     )
     if alone:
         doubts.append(

@@ -97,7 +97,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
-    span = f"Only frequencies above {least} are sought: the longest part without a gap has five cycles of each."
+    span = f"Slower than {least} is left out: fewer than five cycles in the longest part without a gap."
     silent = [] if findings else [f"No frequency above {least} exceeds the noise."]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 

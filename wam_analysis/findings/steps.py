@@ -126,7 +126,7 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
         return VerdictAnswer("correct link", VerdictResult.NO, "missed")
     right = [one.right for one in recording.touched if one.lasts]
     answer = _answer("correct link", [1.0 - part for part in right], 1.0 - TOUCH.lasting, "another link")
-    least = f"{100.0 * min(right, default=0.0):.0f} %"
+    least = f"{100.0 * min(right, default=0.0):.3g} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 

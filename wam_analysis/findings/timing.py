@@ -135,8 +135,8 @@ def _pace(loop: Sequence[Mapping[str, str]]) -> str:
     factor = 1.0 / float(np.mean(1.0 / np.maximum(factors, 1e-3)))  # each is of a second of the arm
     behind = max(float(facts.get(BEHIND, math.nan)) for facts in paced)
     slips = paced[-1].get(SLIPS, "0")
-    slower = f", slower than the wall clock in {slips} places" * (slips != "0")
-    return f"; real-time factor {factor:.2f}, at most {behind:.0f} ms behind{slower}"
+    slower = f"; the computer was late {slips} times, by at most {behind:.0f} ms" * (slips != "0")
+    return f"; real-time factor {factor:.2f}{slower}"
 
 
 def _part_of(read: int, all_of_them: int) -> str:

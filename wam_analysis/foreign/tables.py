@@ -12,7 +12,7 @@ import numpy as np
 
 from wam_analysis.foreign.clocks import nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
-from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, TopicMap, unit_of
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
@@ -189,6 +189,11 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
         whole, unit = _split(str(title))
         name = whole.removeprefix(COMMANDED)
         if f"{name}.".startswith(f"{wanted}."):
+            if unit in UNITS and quantity in given.units and unit_of(quantity, unit) != given.scaled(quantity):
+                raise ValueError(
+                    f"'{title}' has the unit {unit}, and --unit gives another one for {quantity}; leave out --unit, or "
+                    "take the unit out of the title"
+                )
             has_unit = bool(unit) and quantity not in given.units
             factor, shown = unit_of(quantity, unit) if has_unit else given.scaled(quantity)
             own = name[len(wanted) + 1 :]

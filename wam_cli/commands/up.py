@@ -85,7 +85,8 @@ def run(given: argparse.Namespace) -> int:
         close_page()
     for node, code in ended.items():
         if not code:
-            print(f"{process_of(node)} has ended; all were stopped")
+            who = "the scenario" if "scenario" in node.split(", ") else process_of(node)
+            print(f"{who} has ended, so all nodes were stopped")
     if given.scenario and "scenario" in ", ".join(ended).split(", ") and not any(ended.values()):
         record = "" if given.record else "play it with --record, then "
         print(f"played; to see whether its commands were carried out: {record}'wam analyse BAG --steps'")

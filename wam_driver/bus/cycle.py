@@ -141,6 +141,6 @@ class Cycle:
 
     def _fault(self, fault: BusFault, node: int = 0, detail: object = "") -> None:
         if fault in (BusFault.ESTOP, BusFault.SAFETY_IDLE) and (lit := faults(self._pendant)):
-            detail = f", fault of the {' and '.join(lit)}"
+            detail = f": its pendant shows a fault of the {' and '.join(lit)}"
         self._host.trouble = self._host.trouble or Trouble(fault, node, detail)
         self.stop()
