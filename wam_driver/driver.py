@@ -316,6 +316,11 @@ class Driver:
         self._release()
         return self.safety.disable()
 
+    def estop(self) -> Answer:
+        """Stop at once and latch a fault, as a node of a direct run may request."""
+        self.fault(fault("emergency_stop"))
+        return Answer(True, f"fault: emergency stop; {self.safety.held}; call reset_fault, then enable")
+
     def reset_fault(self) -> Answer:
         """Clear a latched fault; the arm stays braked."""
         return self.safety.reset_fault()
