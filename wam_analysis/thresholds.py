@@ -185,7 +185,7 @@ class IdentificationThresholds:
     law: float = 0.003  # standard deviation of friction, per friction, by what its law leaves out
     asymmetry: float = 0.1  # sd of the part of a shared joint's load friction that has one sign, per load friction
     warm_iterations: int = 2  # iterations that start near the solution
-    averaged: int = 5  # windows, over which equations are averaged to see what the estimate depends on
+    averaged: int = 9  # windows, over which equations are averaged to see what the estimate depends on
     identified: float = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
     pinned: float = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
     lightest: float = 0.1  # of the present mass of a link and inertia of a rotor, below which no estimate goes

@@ -41,10 +41,11 @@ Array = NDArray[np.float64]
 class Planted:
     """Torques of a motion by the inverse dynamics of a true arm and friction of its own, not by the regressor."""
 
+    # that of own joints is counted at their motors, but the cables transmit it
     coulomb = np.array([[0.050, 0.035, 0.030, 0.040], [0.056, 0.030, 0.036, 0.048]])
     load = np.array([0.05, 0.02, 0.04, 0.03])
     viscous = np.array([2e-4, 3e-4, 1e-4, 2e-4])
-    joint_coulomb = np.array([0.0, 0.5, 0.4, 0.0])
+    joint_coulomb, is_own = np.array([0.4, 0.5, 0.4, 0.2]), np.array([1.0, 0.0, 0.0, 1.0])
     arm = true_arm(WAM, ModelMismatch((1.0, 1.02, 0.97, 1.05), (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.1, (1.0,) * 4))
 
     def __init__(
@@ -79,7 +80,8 @@ class Planted:
         joint += np.where(qd > 0.0, *self.joint_load) * np.abs(joint) * np.sign(qd)
         v, vdot = (values @ np.linalg.inv(matrix).T for values in (qd, qdd))
         transmitted = joint @ matrix
-        level = np.where(v > 0.0, self.coulomb[0], self.coulomb[1]) + self.load * np.abs(transmitted)
+        level = np.where(v > 0.0, *self.coulomb[:, None]) - (self.is_own * self.joint_coulomb) @ np.abs(matrix)
+        level += self.load * np.abs(transmitted)
         torque: Array = transmitted + arm.motors.inertia * vdot + level * np.sign(v) + self.viscous * v
         return torque
 
@@ -198,8 +200,9 @@ def test_the_covariance_in_the_overlay_is_that_of_the_torques_in_the_motion(
     regressor = Regressor(SHARED, found.unknowns, samples, found.stribeck_velocity)
     torques, used = regressor.equations(found.values).columns, regressor.equations(found.values).is_used
     own = [found.unknowns.names.index(name) for name in tracked.names if name in found.unknowns.names]
-    assert len(own) == len(tracked.names) - 4
-    shown = np.concatenate((torques[:, :, own], regressor.inertial_torques(found.values)), axis=2)
+    assert len(own) == len(tracked.names) - 7, "joint 1 carries no weight"
+    shown = np.concatenate((torques[:, :, own], *regressor.joint_torques(found.values)), axis=2)
+    shown = np.delete(shown, len(own), axis=2)  # the weight at joint 1, which is none
     for motor in range(4):
         mine, all_of_it = shown[used[:, motor], motor], torques[used[:, motor], motor]
         stated = (mine @ tracked.covariance * mine).sum(1).mean()
@@ -293,7 +296,7 @@ def test_what_a_motion_of_one_joint_does_not_show_stays_as_configured() -> None:
         assert model.gravity_torque(q) == pytest.approx(RigidBody(WAM).gravity_torque(q), abs=0.02)
     assert set(found.tracked.names) == {
         f"motors.{what}_{way}.motor1" for what in ("coulomb", "load") for way in WAYS
-    } | {"links.torque.joint1"}
+    } | {"links.inertia.joint1"}
     assert np.linalg.eigvalsh(found.tracked.covariance).min() > 0.0
 
 

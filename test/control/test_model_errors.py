@@ -222,7 +222,7 @@ def test_the_identified_covariance_is_that_of_masses_and_load_too_with_what_they
     given = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
     names = [
         "motors.coulomb_negative.motor2", "joints.coulomb.joint2", "motors.load_positive.motor2",
-        "motors.load_negative.motor2", "joints.load.joint2", "links.torque.joint2",
+        "motors.load_negative.motor2", "joints.load.joint2", "links.weight.joint2",
     ]  # fmt: skip
     mixed = np.random.default_rng(4).standard_normal((6, 6))
     units = np.array([1e-3, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3])

@@ -70,7 +70,9 @@ def _symptoms(shared: Shared, motion: MotionSamples, found: Identification) -> I
         if share > IDENTIFY.contradicted:
             yield Contradiction(Mistake.UNEXPLAINED, (name,), share)
     regressor = Regressor(shared, unknowns, motion, found.stribeck_velocity)
-    before, now = (np.abs(regressor.inertial_torques(each).sum(2)).sum() for each in (unknowns.present, found.values))
+    before, now = (
+        np.abs(np.sum(regressor.joint_torques(each), axis=(0, 3))).sum() for each in (unknowns.present, found.values)
+    )
     if not 1.0 / IDENTIFY.heavier < now / before < IDENTIFY.heavier:
         yield Contradiction(Mistake.WEIGHT, (), float(now / before))
     present = unknowns.present

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, shared_joints, unknowns, with_kept_weight
+from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, unknowns, with_kept_weight
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
 from wam_analysis.identification.tracked_errors import TrackedErrors, Uncertainty, tracked_errors
@@ -141,13 +141,15 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     chosen = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
     regressor = Regressor(shared, sought, motion, chosen.velocity)
     best = _estimate(regressor, sought)
+    moved = _moved_by_averaging(best, sought._replace(prior_sd=best.prior_sd).prior)
+    best = best._replace(values=np.maximum(best.values + moved, _least(sought)))
     # the uncertainty of v_s is part of that of the friction of its motor
     slope = slopes(np.array([one.values for one in tried]), chosen.velocity)
     off = np.log(chosen.without / chosen.velocity)
     for i, name in enumerate(shared.arm.motors.names):
         own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
         best.without[:, own] += np.outer(off[:, i], slope[i, own])
-    uncertainty = _uncertainty(sought, best, _through(shared), regressor.asymmetric_loads(best.values))
+    uncertainty = _uncertainty(sought, best, moved, _unknown_torques(regressor, best.values))
     tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
     return _result(sought, best, chosen.velocity, uncertainty, tracked)
 
@@ -159,20 +161,11 @@ def _still(shared: Shared, equations: Equations) -> list[int]:
     return [j for j, row in enumerate(matrix) if (seconds[row != 0.0] < IDENTIFY.least_motion).any()]
 
 
-def _through(shared: Shared) -> Numbers:
-    """Friction of a joint with a motor of its own at that motor, (n,), N m, as far as the present arm has it."""
-    matrix = TransmissionMap.of(shared.arm).joint_from_motor
-    own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(len(matrix))]
-    return own.T @ shared.arm.joints.dynamic_friction
-
-
 def _estimate(regressor: Regressor, sought: Unknowns, start: Numbers | None = None) -> _Estimate:
     values, prior_sd, centre = sought.present, sought.prior_sd.copy(), sought.present.copy()
     if start is not None:
         values = start
-    least = np.array([0.0 if name.startswith(NOT_NEGATIVE) else -np.inf for name in sought.names])
-    for inert in map(sought.places, ("links.mass", "motors.inertia")):
-        least[inert] = IDENTIFY.lightest * sought.present[inert]
+    least = _least(sought)
     part = _parts(regressor.equations(values))
     for _ in range(IDENTIFY.iterations if start is None else IDENTIFY.warm_iterations):
         equations = regressor.equations(values)
@@ -193,6 +186,14 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Numbers | None = No
     squares = left**2 * equations.is_used
     errors = np.array([squares[part == i].sum(0) for i in range(IDENTIFY.parts)])
     return _Estimate(equations, part, values, without, prior_sd, normal, _rms(left, equations.is_used), errors)
+
+
+def _least(sought: Unknowns) -> Numbers:
+    """Smallest values, (p,)."""
+    least = np.array([0.0 if name.startswith(NOT_NEGATIVE) else -np.inf for name in sought.names])
+    for inert in map(sought.places, ("links.mass", "motors.inertia")):
+        least[inert] = IDENTIFY.lightest * sought.present[inert]
+    return least
 
 
 def _parts(equations: Equations) -> Rows:
@@ -235,19 +236,26 @@ def _rms(left: Numbers, is_used: Mask) -> Numbers:
     return np.sqrt((left**2 * is_used).sum(0) / counts)
 
 
-def _uncertainty(sought: Unknowns, best: _Estimate, through: Numbers, asymmetric: Numbers) -> Uncertainty:
+def _unknown_torques(regressor: Regressor, values: Numbers) -> Numbers:
+    """Torques of the motors, (k, n, u), by one standard deviation of what the equations leave out.
+
+    That is the asymmetry of the joints' load friction, and the friction of own joints as a load: it adds to the load of
+    its motor's friction or takes from it, by the way of the load.
+    """
+    asymmetry = IDENTIFY.asymmetry * values[regressor.unknowns.places("joints.load")]
+    carried = regressor.carried_friction(values)
+    carried = carried[..., None] * np.eye(carried.shape[1])
+    return np.concatenate((regressor.asymmetric_loads(values) * asymmetry, carried), axis=2)
+
+
+def _uncertainty(sought: Unknowns, best: _Estimate, moved: Numbers, unknown: Numbers) -> Uncertainty:
     equations, variance = best.equations, np.zeros(len(sought.names))
-    for way in DIRECTIONS:
-        coulomb, load = (sought.places(f"motors.{what}_{way}") for what in ("coulomb", "load"))
-        # the friction of a joint adds to the load of its motor's friction or takes from it, by the way of the load
-        by_joint = best.values[load] * through / np.sqrt(3.0)
-        variance[coulomb] = (IDENTIFY.law * best.values[coulomb]) ** 2 + by_joint**2
+    coulomb = [i for way in DIRECTIONS for i in sought.places(f"motors.coulomb_{way}")]
+    variance[coulomb] = (IDENTIFY.law * best.values[coulomb]) ** 2
     white = np.linalg.inv(best.normal.information.sum(0) + sought.prior)
-    # what the estimate takes for other friction, were there one sd of the asymmetry
+    # what the estimate takes for other parameters, were there one sd of the unknown torques
     weighted = equations.columns * _weights(equations, best.values)[..., None]
-    size = IDENTIFY.asymmetry * best.values[sought.places("joints.load")]
-    taken = white @ np.einsum("knp,knj->pj", weighted, asymmetric * size)
-    moved = _moved_by_averaging(best, sought._replace(prior_sd=best.prior_sd).prior)
+    taken = white @ np.einsum("knp,knj->pj", weighted, unknown, optimize=True)
     return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
 
 
@@ -256,7 +264,7 @@ def _moved_by_averaging(best: _Estimate, prior: Numbers) -> Numbers:
 
     Of a right model it would not.  Torque ripple accelerates the rotors within a window, the cables give way to it and
     the servo follows, so that it is correlated with the acceleration: a part of it counts as inertia, with the same
-    sign in all parts of the motion.  Averaging takes most of it out.
+    sign in all parts of the motion.  Averaging takes a part of it out; what is left may be as much.
     """
     equations, weights = best.equations, _weights(best.equations, best.values)
     bell = np.hanning(IDENTIFY.averaged + 2)[1:-1]

@@ -51,11 +51,16 @@ class Regressor:
         self._shared, self.unknowns, self._motion = shared, unknowns, motion
         self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
         self._stribeck = stribeck_velocity
+        # friction of joints with a motor of their own at that motor, N m: the cables transmit it
+        own = np.abs(self._matrix) * [[j not in unknowns.joints] for j in range(len(self._matrix))]
+        self._through = own.T @ shared.arm.joints.dynamic_friction
         self._qd = motion.velocities @ self._matrix.T  # of each state
         q, qd, qdd = (values @ self._matrix.T for values in (motion.theta, motion.thetad, motion.thetadd))
         body = RigidBody(shared.arm)
         links = np.array([body.inverse_dynamics_regressor(*state) for state in zip(q, qd, qdd, strict=True)])
         self._links = np.einsum("ji,kjp->kip", self._matrix, links)
+        rest = np.zeros(qd.shape[1])
+        self._weights = np.array([body.inverse_dynamics_regressor(each, rest, rest) for each in q])
         self._carried = (qdd * shared.model.joints.armature) @ self._matrix
         self._is_used = self._steady()
 
@@ -73,13 +78,13 @@ class Regressor:
         motion, unknowns = self._motion, self.unknowns
         n = motion.theta.shape[1]
         columns = np.zeros((*motion.theta.shape, len(unknowns.names)))
-        load = self.load(values)
+        _, load = self.loads(values)
         for group, each in self._friction(load).items():
             found = np.einsum("w,kwn->kn", motion.weights, each)
             columns[:, range(n), unknowns.places(group)] = found
         columns[:, range(n), unknowns.places("motors.inertia")] = motion.thetadd
         self._add_joints(columns, load)
-        driving = self.inertial_torques(values).sum(2)
+        driving = np.sum(self.joint_torques(values), axis=(0, 3))
         for place, motor in zip(unknowns.places("motors.torque_difference"), unknowns.sharing[1:], strict=True):
             first = unknowns.sharing[0]
             columns[:, first, place], columns[:, motor, place] = driving[:, first], -driving[:, motor]
@@ -100,28 +105,46 @@ class Regressor:
             found[f"motors.load_{way}"] = moves * np.abs(load)
         return found
 
-    def load(self, values: Numbers) -> Numbers:
-        """Torque that the cables transmit to each rotor at each state, (k, w, n), N m."""
+    def loads(self, values: Numbers) -> tuple[Numbers, Numbers]:
+        """Torque that each rotor gives to the links, and to the cables, at each state, (k, w, n) each, N m.
+
+        The cables also transmit the friction of an own joint, which is counted at its motor: as the arm is configured.
+        """
         motion, unknowns = self._motion, self.unknowns
         rotor = values[unknowns.places("motors.inertia")] * motion.thetadd
         load = motion.torques - rotor[:, None, :]
         friction = self._friction(load)
-        return load - sum(each * values[unknowns.places(group)] for group, each in friction.items())
+        load -= sum(each * values[unknowns.places(group)] for group, each in friction.items())
+        return load, load + np.sign(motion.velocities) * self._through
 
-    def inertial_torques(self, values: Numbers) -> Numbers:
-        """Torque of links, pulleys and rotors at each joint as torques of the motors, (k, n motors, n joints), N m."""
+    def joint_torques(self, values: Numbers) -> tuple[Numbers, Numbers]:
+        """Torques of the motors by the weight, and by the inertia of links, pulleys and rotors at each joint.
+
+        (k, n motors, n joints) each, N m.
+        """
         motion, unknowns = self._motion, self.unknowns
         at, jacobian, constant = self._inertial(values)
-        at_motors = self._carried + self._links @ (constant + jacobian @ values[at])
+        links = constant + jacobian @ values[at]
+        at_motors = self._carried + self._links @ links
         at_motors += values[unknowns.places("motors.inertia")] * motion.thetadd
-        at_joints = at_motors @ np.linalg.inv(self._matrix)
-        return at_joints[:, None, :] * self._matrix.T
+        weights = self._weights @ links
+        inertias = at_motors @ np.linalg.inv(self._matrix) - weights
+        return weights[:, None, :] * self._matrix.T, inertias[:, None, :] * self._matrix.T
 
     def asymmetric_loads(self, values: Numbers) -> Numbers:
         """Torques of the motors, (k, n, joints), by the part of joints' load friction that has one sign, per torque."""
-        at_joints = np.einsum("w,kwn->kn", self._motion.weights, self._at_joints(self.load(values)))
+        at_joints = np.einsum("w,kwn->kn", self._motion.weights, self._at_joints(self.loads(values)[1]))
         joints = list(self.unknowns.joints)
         return at_joints[:, None, joints] * self._matrix[joints].T
+
+    def carried_friction(self, values: Numbers) -> Numbers:
+        """Friction of the motors, (k, n), N m, by one sd of the friction of own joints, which loads them."""
+        (links, load), unknowns = self.loads(values), self.unknowns
+        carrying = self._friction(load + IDENTIFY.friction * (load - links))
+        found = np.zeros(load.shape)
+        for group, each in self._friction(load).items():
+            found += (carrying[group] - each) * values[unknowns.places(group)]
+        return np.asarray(np.einsum("w,kwn->kn", self._motion.weights, found), np.float64)
 
     def _at_joints(self, load: Numbers) -> Numbers:
         """Size of the torque that the cables transmit to each joint at each state, (k, w, n), N m."""

@@ -1,12 +1,13 @@
 """How certain an estimate is, and its covariance in the errors of the model that the contact estimator tracks.
 
-It tracks friction of each direction, friction by load, and the torque of the inertias at each joint, per torque.  The
+It tracks friction of each direction, friction by load, and weight and inertia at each joint, per torque.  The
 error of any other parameter has torques, too: viscous friction that is too low is in part Coulomb friction.  Each is
 counted as those tracked errors whose torques are nearest to its own in the motion; what no tracked error explains is
 small, and `left`.
 """
 
 from collections.abc import Sequence
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -59,8 +60,8 @@ class TrackedErrors(NamedTuple):
 
     Attributes
     ----------
-    names : t, those that the motion shows; links.torque.J is the torque of links, pulleys and rotors at a joint.
-    covariance : (t, t), of friction in N m, load friction and torque of the inertias per torque.
+    names : t, those that the motion shows; links.inertia.J is of links, pulleys and rotors at a joint.
+    covariance : (t, t), of friction in N m, load friction, weights and inertias per torque.
     left : (n,), standard deviation of each motor's torque by errors that are no tracked ones, N m.
     """
 
@@ -88,7 +89,12 @@ def tracked_errors(
     shown = np.abs(equations.columns[equations.is_used]).max(axis=0) > IDENTIFY.least_column
     own = [i for i, name in enumerate(names) if name.startswith(THEMSELVES) and shown[i]]
     moved = [j for j in range(len(joints)) if j not in still]
-    every = np.concatenate((equations.columns[:, :, own], regressor.inertial_torques(values)[:, :, moved]), axis=2)
+    torques = np.concatenate([each[:, :, moved] for each in regressor.joint_torques(values)], axis=2)
+    called = [f"links.{what}.{joints[j]}" for what in ("weight", "inertia") for j in moved]
+    has_torque = (
+        np.abs(torques).max(axis=(0, 1)) > IDENTIFY.least_column
+    )  # a joint about the vertical carries no weight
+    every = np.concatenate((equations.columns[:, :, own], torques[:, :, has_torque]), axis=2)
     tracked, columns = every[equations.is_used], equations.columns[equations.is_used]
     columns[:, [i for i, name in enumerate(names) if name.startswith(CONSTANTS)]] = 0.0
     size = np.maximum(np.linalg.norm(tracked, axis=0), IDENTIFY.least_column)
@@ -99,7 +105,7 @@ def tracked_errors(
         for i, used in enumerate(equations.is_used.T)
     ]
     return TrackedErrors(
-        (*(names[i] for i in own), *(f"links.torque.{joints[j]}" for j in moved)),
+        (*(names[i] for i in own), *compress(called, has_torque)),
         uncertainty.covariance(nearest),
         np.array(rms),
     )

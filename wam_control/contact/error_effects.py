@@ -58,6 +58,10 @@ class LinkEffects:
         """Torques, (n, 3 n + 1), per m of the centres' coordinates in the frames of their links, and per kg."""
         return self._body.inverse_dynamics_regressor(pose, velocity, acceleration).dot(self._per_error)
 
+    def weights(self, pose: Array) -> Array:
+        """Torques that carry the links, (n,), N m."""
+        return self._body.gravity_torque(pose)
+
 
 class GaugeEffects:
     """Effects of masses, centres and payload on the torques of joint sensors, and the covariance of the gauges."""
@@ -78,7 +82,7 @@ class GaugeEffects:
 
 
 class ErrorEffects:
-    """Effects of friction, masses, loads, torque constants, centres, delay and payload, and the covariance of the rest.
+    """Effects of friction, weights, inertias, loads, constants, centres, delay, payload; the covariance of the rest.
 
     Parameters
     ----------
@@ -104,7 +108,7 @@ class ErrorEffects:
         self._dynamic, levels = friction.dynamic, 0.5 * friction.dynamic
         through = self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
         # the same of the errors of the model per signal
-        self._errors = np.hstack((-through * levels, through * levels, np.eye(n), -through))
+        self._errors = np.hstack((-through * levels, through * levels, np.eye(n), np.eye(n), -through))
         # with the model, the constants were identified that motors have in common that move the same joints
         driven = self._from_motors != 0.0
         common = (driven.T.astype(float) @ driven > 0.0).astype(float) * side.is_identified
@@ -142,14 +146,15 @@ class ErrorEffects:
             0.0, np.square(by_distance).dot(EQUAL) - sliding * sliding - slope * slope * DISTANCE_VARIANCE
         )
         modelled = self._from_motors.T.dot(model)
-        effects = np.zeros((n, 13 * n + 2))
-        sizes = np.concatenate((moving + sliding, moving - sliding, model, loaded))
-        np.multiply(self._errors, sizes, out=effects[:, : 7 * n])
+        weights = self._links.weights(motion.pose)
+        effects = np.zeros((n, 14 * n + 2))
+        sizes = np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded))
+        np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
         own = modelled[:, None] * self._differs - np.diag(self._from_motors.T.dot(residual))
-        effects[:, 7 * n : 8 * n] = self._to_joints.dot(own)
-        effects[:, 8 * n : 10 * n] = -self._through * (self._dynamic * slope)
-        effects[:, 10 * n] = self._to_joints.dot(signals[-n:])
-        effects[:, 10 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
+        effects[:, 8 * n : 9 * n] = self._to_joints.dot(own)
+        effects[:, 9 * n : 11 * n] = -self._through * (self._dynamic * slope)
+        effects[:, 11 * n] = self._to_joints.dot(signals[-n:])
+        effects[:, 11 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
         residual = residual - given.payload[0] * effects[:, -1]
         at_rest, shape = self._sds
         variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved

@@ -18,7 +18,7 @@ WAYS = ("positive", "negative")
 
 
 class ModelPrior(NamedTuple):
-    """Errors: friction in positive, then in negative motion; masses; load; constants; and others.
+    """Errors: friction in positive, then in negative motion; weights; inertias; load; constants; and others.
 
     Friction and its share of the load are those of motors, then joints.
 
@@ -72,6 +72,7 @@ def model_prior(
             CONTACT.tolerable_friction,
         ),
         ([f"masses at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_mass),
+        ([f"inertias at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_inertia),
         ([*map(load_error, shafts)], loads, CONTACT.tolerable_torque),
         (
             [f"torque constant of {name}" for name in arm.motors.names],
@@ -92,7 +93,7 @@ def model_prior(
         (["payload"], payload_sd, CONTACT.tolerable_payload + given.payload[1] - given.payload[0]),
     ]
     if use_joint_sensors:
-        kinds = [kinds[1], *kinds[6:]]
+        kinds = [kinds[1], *kinds[7:]]
     names = tuple(name for each, _, _ in kinds for name in each)
     sds, tolerable = (
         np.concatenate([np.broadcast_to(kind[which], len(kind[0])) for kind in kinds]) for which in (1, 2)
@@ -108,7 +109,7 @@ def model_prior(
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
-    """Put in place what was identified: friction, per mean of both directions, load friction, torques of the inertias.
+    """Put in place what was identified: friction, per mean of both directions, load friction, weights and inertias.
 
     Errors of joints in both directions are one identified parameter, errors of load the mean of two.
     """
@@ -130,14 +131,15 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
             if level:
                 add(first + n + j, f"joints.coulomb.{joints[j]}", 1.0 / level)
     for j, (motor, joint) in enumerate(zip(motors, joints, strict=True)):
-        add(4 * n + j, f"links.torque.{joint}", 1.0)
-        add(5 * n + j, f"motors.load_positive.{motor}", 0.5)
-        add(5 * n + j, f"motors.load_negative.{motor}", 0.5)
-        add(6 * n + j, f"joints.load.{joint}", 1.0)
-    if all(f"links.torque.{joint}" in known for joint in joints):  # with the torques, the centres are identified
-        covariance[10 * n + 1 : -1] = 0.0
-    errors[5 * n : 6 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
-    errors[6 * n : 7 * n] = model.joints.load
+        add(4 * n + j, f"links.weight.{joint}", 1.0)
+        add(5 * n + j, f"links.inertia.{joint}", 1.0)
+        add(6 * n + j, f"motors.load_positive.{motor}", 0.5)
+        add(6 * n + j, f"motors.load_negative.{motor}", 0.5)
+        add(7 * n + j, f"joints.load.{joint}", 1.0)
+    if all(f"links.inertia.{joint}" in known for joint in joints):  # with the torques, the centres are identified
+        covariance[11 * n + 1 : -1] = 0.0
+    errors[6 * n : 7 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
+    errors[7 * n : 8 * n] = model.joints.load
     rows = np.flatnonzero(mixing.any(axis=1))
     found = mixing[rows] @ np.reshape(model.covariance.values, (len(known), len(known))) @ mixing[rows].T
     covariance[rows] = covariance[:, rows] = 0.0

@@ -19,7 +19,7 @@ class ObserverParameters:
         "ratio of nominal to configured mass and inertia of each link", low=0.1, high=10.0
     )
     friction_scale: float = parameter("ratio of nominal to configured friction", high=10.0)
-    mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", high=1.0)
+    mass_uncertainty: float = parameter("sd of the model torques of gravity and of inertia, per torque", high=1.0)
     centre_uncertainty: float = parameter("sd of each coordinate of the centre of mass of each link", "m", high=1.0)
     moving_uncertainty: float = parameter(
         "sd of the friction of a moving shaft at the start, before it is tracked, per dynamic friction", high=10.0

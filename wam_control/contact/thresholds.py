@@ -71,6 +71,7 @@ class ContactThresholds:
     # errors of the model above which it is off
     tolerable_friction: float = 0.2  # per friction
     tolerable_mass: float = 0.04  # per torque
+    tolerable_inertia: float = 0.2  # per torque of the acceleration
     tolerable_torque: float = 0.05  # of load friction and torque constants, per torque
     tolerable_centre: float = 0.02  # m, of a centre of mass
     tolerable_delay: float = 3e-3  # s, of the torques

@@ -159,7 +159,7 @@ class TrueFriction(NamedTuple):
     """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
 
     coulomb: Array  # without link load; less the torque offset of the motor in positive motion, N m
-    at_joint: Array  # friction of the joints among it, which the cables transmit, N m
+    at_joint: Array  # friction of the joints among it, which the cables transmit and which is a load, too, N m
     drop: Array  # F_s - F_c, N m
     load: Array
     viscous: Array  # N m s/rad
@@ -175,7 +175,7 @@ class TrueFriction(NamedTuple):
         moves : (k, n), where a motor moves in this direction.
         """
         sign = 1.0 - 2.0 * way
-        transmitted = np.abs(load + sign * self.at_joint[way]) - self.at_joint[way]
+        transmitted = np.abs(load + sign * self.at_joint[way])
         mean = (transmitted * moves).sum(0) / moves.sum(0)
         slow = np.exp(-((speed / self.stribeck_velocity) ** 2))
         found: Array = self.coulomb[way] + self.drop[way] * slow + self.load[way] * mean + self.viscous * speed
@@ -240,14 +240,7 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     at_joint = own.T @ joint_coulomb + signs * ((own.T * np.sign(matrix.T)) @ (joint_lean * joint_coulomb))
     factor = load * (1.0 + signs * lean) + (own.T > 0.0) @ joint_load
     factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
-    # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
-    at_motor = (
-        coulomb * (1.0 + signs * lean)
-        + by_tension
-        + own.T @ joint_coulomb
-        + signs * (constant - offset)
-        + factor * at_joint
-    )
+    at_motor = coulomb * (1.0 + signs * lean) + by_tension + own.T @ joint_coulomb + signs * (constant - offset)
     # torques are reported with the torque constants as configured
     scale = 1.0 / np.array(driver.mismatch.torque_constant)
     return TrueFriction(

@@ -86,13 +86,14 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
     shared = configuration.shared
     found = identify(shared, samples)
     truth = true_friction(configuration)
-    load = Regressor(shared, found.unknowns, samples, found.stribeck_velocity).load(found.values)
-    load = load.reshape(-1, load.shape[2])  # of each motor apart from friction, at each state, N m
+    regressor = Regressor(shared, found.unknowns, samples, found.stribeck_velocity)
+    # of each motor at each state, (k, n), N m, without and with the friction of own joints
+    links, cables = (each.reshape(-1, each.shape[2]) for each in regressor.loads(found.values))
     errors: dict[str, list[Array]] = {name: [] for name in ("level", "level_sd", "coulomb", "coulomb_sd", "before")}
     for way, direction in enumerate(DIRECTIONS):
-        moves = (samples.velocities * (1.0 - 2.0 * way) > 0.0).reshape(load.shape)
-        rows = friction_row(found, direction, (np.abs(load) * moves).sum(0) / moves.sum(0))
-        true, coulomb = truth.level(way, AT.speed, load, moves), truth.coulomb[way]
+        moves = (samples.velocities * (1.0 - 2.0 * way) > 0.0).reshape(links.shape)
+        rows = friction_row(found, direction, (np.abs(cables) * moves).sum(0) / moves.sum(0))
+        true, coulomb = truth.level(way, AT.speed, links, moves), truth.coulomb[way]
         at = found.unknowns.places(f"motors.coulomb_{direction}")
         errors["level"].append((rows @ found.values - true) / true)
         errors["level_sd"].append(np.sqrt(found.uncertainty.variances(rows)) / true)
