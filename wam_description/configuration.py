@@ -197,12 +197,14 @@ class Configuration(NamedTuple):
             raise ParameterError(f"{given}, {where}: {error}") from error
 
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:
-        """Whether the file itself has usable parameters, so that what was replaced is at fault."""
+        """Whether the file itself has usable parameters, or none, so that what was given besides is at fault."""
         try:
-            build(cls, Configuration.load(self.path).sections[section])
-        except (ParameterError, KeyError):
+            written = Configuration.load(self.path).sections
+            if section in written:
+                build(cls, written[section])
+        except ParameterError:
             return False
-        return True
+        return section in written or bool(self.sections[section])
 
 
 def files_of(path: str | Path) -> list[Path]:

@@ -48,6 +48,8 @@ def declared(entry: str) -> Declaration:
         ) from error
     except Exception as error:
         raise ParameterError(f"node '{entry}' cannot be imported: {raised(error)}; correct '{module}'") from error
+    if "<locals>" in name:
+        raise ParameterError(f"node '{entry}': the class is inside a function; move it to the top of '{module}'")
     if not hasattr(imported, name):
         classes = [key for key, one in vars(imported).items() if getattr(one, "__module__", "") == module]
         there = ", ".join(classes) or "none"

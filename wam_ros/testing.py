@@ -124,7 +124,7 @@ class RunningArm:
 
         Parameters
         ----------
-        own : further nodes: classes, or 'module:Class'.
+        own : further nodes: classes at the top of a module, or 'module:Class'.
         configuration : name, path or object.
         nodes : names of the nodes; by default those of the configuration.
         values : by keyword.  The name of a group of shared parameters or of a node, with a mapping of values, as

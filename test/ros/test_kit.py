@@ -146,6 +146,7 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
         ({"driver": {"watchdogg": 1.0}}, "did you mean"),
         ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
         ({"timing": {"period": -1.0}}, "period"),
+        ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you gave .*damping.*gan"),
         ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
     ],
 )

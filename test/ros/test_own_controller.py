@@ -146,6 +146,7 @@ LOOP = 'from test_own_controller import Echo\nclass Mine(Echo): name = "velocity
 NO_NODES = [
     ("gravitation", "", "no node is named 'gravitation'; nodes: driver, transform"),
     ("wam_control.velocity.gravity_node:Gravity", "", "has no class 'Gravity'; did you mean 'GravityNode'\\? it has"),
+    ("wam_control.velocity.gravity_node:f.<locals>.Own", "", "is inside a function; move it to the top of 'wam_con"),
     ("no_such_package:Class", "", "check that 'no_such_package' is installed or on PYTHONPATH"),
     ("impedance:ImpedanceParameters", "", "is no node: name and parameters"),
     ("broken_module:Any", "gain = 1 +\n", "node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"),

@@ -174,23 +174,22 @@ def analyse_bag(
 def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Section:
     """Three lines: what the recording is, what is wrong with it, what it shows."""
     what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
-    wrong = [sentence for section in sections for sentence in section.wrong]
-    shows = [sentence for section in sections for sentence in section.shows]
+    wrong = [(sentence, section.title) for section in sections for sentence in section.wrong]
+    shows = [(sentence, section.title) for section in sections for sentence in section.shows]
     lines = (
-        _line("Wrong", wrong, "nothing was found.", "defect"),
-        _line("Shows", shows, "nothing that can be evaluated.", "result"),
+        _line("Wrong", wrong, "nothing was found."),
+        _line("Shows", shows, "nothing that can be evaluated."),
     )
     return Section("verdict", "Verdict", (what, *lines))
 
 
-def _line(title: str, sentences: list[str], silent: str, kind: str) -> str:
-    """The first of some sentences in a line, and how many follow below."""
-    if not sentences:
+def _line(title: str, found: list[tuple[str, str]], silent: str) -> str:
+    """The first of some sentences in a line, and the sections with the others."""
+    if not found:
         return f"{title}: {silent}"
-    kept = sentences[: LAYOUT.stated]
-    rest = len(sentences) - len(kept)
-    more = f" The sections below have {counted(rest, f'more {kind}')}." * (rest > 0)
-    return f"{title}: {' '.join(kept)}{more}"
+    kept, rest = found[: LAYOUT.stated], found[LAYOUT.stated :]
+    more = f" More below: {', '.join(dict.fromkeys(section for _, section in rest))}." * bool(rest)
+    return f"{title}: {' '.join(sentence for sentence, _ in kept)}{more}"
 
 
 def _foreign_line(recording: AnalysedRecording) -> str:
