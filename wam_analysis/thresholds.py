@@ -262,6 +262,7 @@ class ReportLayout:
     column: int = 12  # width of a number in a table at least, columns
     stated: int = 3  # sentences of a line of the verdict
     changes: int = 4  # of parameters that are named
+    begins: int = 5  # of motions that are named
     # pictures
     points: int = 6000  # points of a line
     digits: int = 6  # of a number

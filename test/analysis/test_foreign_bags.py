@@ -347,6 +347,7 @@ def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: f
     analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap(commands=("/cmd/joints",))))
     (stick_slip,) = (section for section in analysis.sections if section.key == "stick_slip")
     assert [one.partition(":")[0] for one in stick_slip.shows] == ["hunts"]
+    assert re.search(r"\(from 0\.(79|8\d), 1\.(79|8\d), 2\.", stick_slip.shows[0])
     assert numbers["swings: slips"] == 1.0
     assert numbers["hunts: slips"] == pytest.approx(24.0, abs=1.0)
 

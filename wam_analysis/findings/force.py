@@ -188,9 +188,11 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"Not controlled, so their stability is not evaluated: {', '.join(refused)}.")
     for one in held:
         theory = recording.theories[one.hold.name]
-        found = [_fate(one)[0], *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]
+        text, fate = _fate(one)
+        found = [text, *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]
         sentences += [sentence for sentence in found if sentence not in sentences]
-        (wrong if _diverges(one) else verdict).extend(filter(None, [_fate(one)[1]]))
+        if fate is not Verdict.SETTLED:
+            (wrong if fate is Verdict.DIVERGED else verdict).append(text)
         findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory)]
     if not held and not refused:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
@@ -202,19 +204,18 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong, by_gains=True)
 
 
-def _diverges(one: HeldForce) -> bool:
-    return one.swinging is not None and one.swinging.swings.verdict is Verdict.DIVERGED
-
-
-def _fate(one: HeldForce) -> tuple[str, str]:
-    """A sentence on whether the force settles or cycles, and the same for the verdict ('' where all is well)."""
+def _fate(one: HeldForce) -> tuple[str, Verdict]:
+    """A sentence on whether the force settles, and which: DIVERGED, LIMIT_CYCLE, SETTLED for all else."""
     name, cycle = one.hold.name, one.cycle
     if one.swinging is None:
-        return f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.", ""
+        return (
+            f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.",
+            Verdict.SETTLED,
+        )
     shaft, seen = one.swinging
-    is_bad = seen.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
+    fate = seen.verdict if seen.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED) else Verdict.SETTLED
     text = f"{name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {_words(seen)}"
-    if shaft and is_bad:
+    if shaft and fate is not Verdict.SETTLED:
         what = "limit cycle of" if seen.verdict is Verdict.LIMIT_CYCLE else "last"
         text += f"; {what} {shown(seen.peak_to_peak, 'rad')} peak to peak, period {shown(seen.period, 's')}"
     elif cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded:
@@ -222,10 +223,10 @@ def _fate(one: HeldForce) -> tuple[str, str]:
             f"; limit cycle of {shown(cycle.peak_to_peak, 'N')} peak to peak, period {shown(cycle.period, 's')} "
             f"(confidence {cycle.confidence:.2f})"
         )
-        is_bad = True
+        fate = Verdict.LIMIT_CYCLE if fate is Verdict.SETTLED else fate
     else:
         text += "; no limit cycle detected"
-    return f"{text}.", f"{text}." if is_bad else ""
+    return f"{text}.", fate
 
 
 def _words(seen: Swings) -> str:

@@ -9,7 +9,7 @@ from wam_analysis.findings.finding import Finding, Section, rest_words, shown
 from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import SHAFT
+from wam_analysis.thresholds import LAYOUT, SHAFT
 from wam_bag.arrays import Mask, Numbers, Rows
 
 
@@ -34,6 +34,9 @@ def stick_section(recording: AnalysedRecording) -> Section:
             Finding(f"{one.label}: slips", "", float(found.slips)),
         ]
         sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
+        if recording.is_foreign and found.stuck and 0 < found.slips == len(found.begins):  # ours have the arm's time
+            begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.begins]] + ["..."] * (found.slips > LAYOUT.begins)
+            sentence += f" (from {', '.join(begins)} s)"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
             verdict.append(f"{sentence}.")
@@ -50,11 +53,13 @@ class Sticking(NamedTuple):
     stuck : fraction of the time at rest.
     slips : motions between; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
+    begins : when each motion began, s; none of a motion back and forth.
     """
 
     stuck: float
     slips: int
     commanded: float
+    begins: tuple[float, ...] = ()
 
 
 def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
@@ -62,6 +67,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if rests(source):
         return Sticking(1.0, 0, math.nan)
     still = slips = total = disobeyed = 0
+    begins: list[float] = []
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
         rest = rest_speed(piece, least)
@@ -76,12 +82,14 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         phases = without_turns(phases, piece.values["velocity"], rest)
         still += round(phases.stuck * len(piece.time))
         slips += len(phases.slips)
+        begins += piece.time[phases.slips[:, 0]].tolist()
         if command is not None:
             moves = np.abs(_commanded_speed(command, piece.time)) > rest
             disobeyed += sum(int(np.sum(moves[a:b])) for a, b in phases.sticks.tolist())
     if not total:
         return None
-    return Sticking(still / total, slips, disobeyed / still if command is not None and still else math.nan)
+    unmet = disobeyed / still if command is not None and still else math.nan
+    return Sticking(still / total, slips, unmet, tuple(begins))
 
 
 def hidden_motion(source: Source) -> float:
