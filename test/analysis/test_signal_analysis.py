@@ -294,10 +294,10 @@ def test_efficiency_is_work_out_over_work_in_both_ways():
     time = np.arange(10_000) / 1000.0
     motor = np.sin(time)
     joint = np.where(motor > 0.0, 0.93 * motor, motor / 0.8)
-    found = efficiency(time, motor, joint)
-    assert found.forward == near(0.93)
-    assert found.back == near(0.8)
-    assert found.forward_put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
+    forward, back = efficiency(time, motor, joint), efficiency(time, -joint, -motor)
+    assert forward.ratio == near(0.93)
+    assert back.ratio == near(0.8)
+    assert forward.put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
 
 
 # timing

@@ -28,25 +28,26 @@ def power_section(recording: AnalysedRecording) -> Section | None:
     known = np.isfinite(joint) & np.isfinite(motor)
     sentences, findings = [], []
     if np.any(known):
-        found = efficiency(signals.time[known], motor[known], joint[known])
-        lost = found.forward_put - found.forward_got + found.back_put - found.back_got
+        forward = efficiency(signals.time[known], motor[known], joint[known])
+        back = efficiency(signals.time[known], -joint[known], -motor[known])
+        lost = forward.put - forward.got + back.put - back.got
         mixed = known & (motor * joint < 0.0)
         stored = float(np.sum(np.abs(motor[mixed]))) * float(np.median(np.diff(signals.time)))
-        is_measured = not (found.forward > 1.0 or found.back > 1.0 or stored > lost)
+        is_measured = not (forward.ratio > 1.0 or back.ratio > 1.0 or stored > lost)
         if not is_measured:
             sentences.append(
                 "The efficiency was not measured: rotors and cables store and return more work here than is lost."
             )
-        elif found.forward_put > SHAFT.least_work:
+        elif forward.put > SHAFT.least_work:
             rows = known & (motor > 0.0) & (joint > 0.0)
             expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
             expected = max(expected, 0.0)
             note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
-            findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
-            sentences.append(f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission.")
-        if is_measured and found.back_put > SHAFT.least_work:
-            findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
-            sentences.append(f"While backdriven, the links put {shown(found.back_put, 'J')} into it.")
+            findings.append(Finding("efficiency, motors to links", "%", 100.0 * forward.ratio, 100.0 * expected, note))
+            sentences.append(f"While driving, the motors put {shown(forward.put, 'J')} into the transmission.")
+        if is_measured and back.put > SHAFT.least_work:
+            findings.append(Finding("efficiency, links to motors", "%", 100.0 * back.ratio, note="backdriven"))
+            sentences.append(f"While backdriven, the links put {shown(back.put, 'J')} into it.")
     findings += _backdrive(arm, friction, joints)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")

@@ -5,54 +5,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_bag.arrays import Mask, Numbers
+from wam_bag.arrays import Numbers
 
 
 class Efficiency(NamedTuple):
-    """Work in and out while power flows one way, J, and their ratio; NaN if none flowed.
+    """Work that was put in and got out while power flowed one way, J."""
 
-    `forward` is from the motor to the joint, `back` from the joint to the motor.
-    """
+    put: float
+    got: float
 
-    forward: float
-    forward_put: float
-    forward_got: float
-    back: float
-    back_put: float
-    back_got: float
+    @property
+    def ratio(self) -> float:
+        """NaN where no power flowed."""
+        return self.got / self.put if self.put > 0.0 else math.nan
 
 
-def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Efficiency:
-    """Efficiency as work at the joint over work at the motor, 3.2.4, and the same backwards.
+def efficiency(time: Numbers, put: Numbers, got: Numbers) -> Efficiency:
+    """Efficiency as work got out over work put in, 3.2.4, of the samples in which both powers are positive.
 
     Parameters
     ----------
     time : (n,), s.
-    motor_power : (n,), power of the motor on the transmission, W, less that which accelerates the rotor.
-    joint_power : (n,), power of the transmission on the joint, W.
+    put, got : (n,), power at either side in one direction, W, less that which accelerates a rotor.
 
     Notes
     -----
-    A sample is forward if both powers are positive, backward if both are negative.  Of a gap that is longer than the
-    median period nothing is known: it holds no work.
+    Of a gap that is longer than the median period nothing is known: it holds no work.
     """
     dt = np.diff(time, append=time[-1:])
     if len(time) > 1:
         dt = np.minimum(dt, np.median(dt[:-1]))
         dt[-1] = dt[-2]
-
-    def work(power: Numbers, rows: Mask) -> float:
-        return float(np.sum(np.abs(power[rows]) * dt[rows]))
-
-    onward = (motor_power > 0.0) & (joint_power > 0.0)
-    backward = (motor_power < 0.0) & (joint_power < 0.0)
-    put, got = work(motor_power, onward), work(joint_power, onward)
-    back_put, back_got = work(joint_power, backward), work(motor_power, backward)
-    return Efficiency(
-        forward=got / put if put > 0.0 else math.nan,
-        forward_put=put,
-        forward_got=got,
-        back=back_got / back_put if back_put > 0.0 else math.nan,
-        back_put=back_put,
-        back_got=back_got,
-    )
+    onward = (put > 0.0) & (got > 0.0)
+    return Efficiency(float(put[onward] @ dt[onward]), float(got[onward] @ dt[onward]))
