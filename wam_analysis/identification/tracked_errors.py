@@ -91,9 +91,8 @@ def tracked_errors(
     moved = [j for j in range(len(joints)) if j not in still]
     torques = np.concatenate([each[:, :, moved] for each in regressor.joint_torques(values)], axis=2)
     called = [f"links.{what}.{joints[j]}" for what in ("weight", "inertia") for j in moved]
-    has_torque = (
-        np.abs(torques).max(axis=(0, 1)) > IDENTIFY.least_column
-    )  # a joint about the vertical carries no weight
+    # a joint about the vertical carries no weight
+    has_torque = np.abs(torques).max(axis=(0, 1)) > IDENTIFY.least_column
     every = np.concatenate((equations.columns[:, :, own], torques[:, :, has_torque]), axis=2)
     tracked, columns = every[equations.is_used], equations.columns[equations.is_used]
     columns[:, [i for i, name in enumerate(names) if name.startswith(CONSTANTS)]] = 0.0
