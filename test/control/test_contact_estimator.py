@@ -108,8 +108,8 @@ def test_while_a_force_changes_its_standard_deviation_has_the_delay_of_the_obser
         force = 3.0 * min(max(tick - 100, 0), 40)  # N, up to 120 N in 40 ms
         strain = (gravity - force * lever).tolist()
         assert estimator.observe(State(arm.q, ZERO, strain), State(arm.q, ZERO, strain), DT)
-        if tick % OUTER == 0 and (one := estimator.estimate()).hypotheses and one.link == "outer_link":
-            error, sd = np.linalg.norm(one.force) - force, one.hypotheses[0].force_sd
+        if tick % OUTER == 0 and (one := estimator.estimate()).hypotheses and one.best.cover == "outer_link":
+            error, sd = np.linalg.norm(one.best.force) - force, one.best.force_sd
             (rising if 110 < tick <= 140 else steady if tick > 500 else []).append((error, sd))
     assert len(rising) == 6
     assert max(abs(error) for error, _ in rising) > 40.0
@@ -123,20 +123,20 @@ def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> Non
     force = (0.0, size * math.cos(math.radians(phi)), size * math.sin(math.radians(phi)))
     estimate = at_rest("outer_link", 0.28, force)
     assert estimate.in_contact
-    assert estimate.link == "outer_link"
-    assert estimate.position == pytest.approx(0.28, abs=max(0.03, estimate.position_sd))
-    assert abs(estimate.position - 0.28) < 2 * estimate.position_sd
-    assert np.linalg.norm(np.subtract(estimate.force, force)) < 0.15 * size
+    assert estimate.best.cover == "outer_link"
+    assert estimate.best.position == pytest.approx(0.28, abs=max(0.03, estimate.best.position_sd))
+    assert abs(estimate.best.position - 0.28) < 2 * estimate.best.position_sd
+    assert np.linalg.norm(np.subtract(estimate.best.force, force)) < 0.15 * size
     assert not estimate.reasons
 
 
 def test_joint_sensors_feel_the_moment_of_a_push_on_the_inner_link() -> None:
     estimate = at_rest("inner_link", 0.3, (0.0, 8.0, 0.0))
-    assert estimate.link == "inner_link"
-    assert math.isnan(estimate.position)
+    assert estimate.best.cover == "inner_link"
+    assert math.isnan(estimate.best.position)
     assert Reason.MOMENT_ONLY in estimate.reasons
-    assert estimate.moment[2] == pytest.approx(2.4, rel=0.05)
-    assert np.linalg.norm(estimate.force) <= 8.0
+    assert estimate.best.moment[2] == pytest.approx(2.4, rel=0.05)
+    assert np.linalg.norm(estimate.best.force) <= 8.0
 
 
 def test_a_push_on_the_inner_link_whose_torques_are_those_of_one_along_the_outer_is_certain_on_neither() -> None:
@@ -160,8 +160,8 @@ def test_joint_sensors_locate_a_push_on_an_arm_in_motion() -> None:
         assert estimator.observe(State(ZERO, ZERO, ZERO), State(*arm.sensors()), DT)
         if tick % OUTER == 0 and tick > 200:
             found = estimator.estimate()
-            assert found.link == "outer_link"
-            errors.append(abs(found.position - 0.28))
+            assert found.best.cover == "outer_link"
+            errors.append(abs(found.best.position - 0.28))
     assert max(errors) < 0.005
 
 
@@ -266,9 +266,9 @@ def test_motors_alone_feel_5_newton_within_60_milliseconds_in_motion(seed: int) 
     first = next(felt for felt in results if felt.estimate.in_contact)
     assert first.tick - 600 <= 60
     settled = next(felt.estimate for felt in results if felt.tick >= 680)
-    assert settled.link == "outer_link"
-    assert np.linalg.norm(np.subtract(settled.force, (0, 4, 3))) < 2.0
-    assert abs(settled.position - 0.28) < max(0.04, 2.5 * settled.position_sd)
+    assert settled.best.cover == "outer_link"
+    assert np.linalg.norm(np.subtract(settled.best.force, (0, 4, 3))) < 2.0
+    assert abs(settled.best.position - 0.28) < max(0.04, 2.5 * settled.best.position_sd)
 
 
 def test_contact_is_released_below_the_lower_threshold_only() -> None:
@@ -312,8 +312,8 @@ def test_nothing_is_felt_before_anything_is_observed_or_after_reset() -> None:
     for _ in range(2):
         found = estimator.estimate()
         assert not found.in_contact
-        assert found.link == ""
-        assert math.isnan(found.position)
+        assert found.best.cover == ""
+        assert math.isnan(found.best.position)
         assert found.reasons == Reason.TOO_EARLY
         estimator.observe(State(ZERO, ZERO, ZERO), State(ZERO, ZERO, [9.0] * 4), DT)
         estimator.reset()

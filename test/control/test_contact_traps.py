@@ -114,9 +114,9 @@ def test_stiction_hides_2_newton_at_rest_and_the_estimate_says_so() -> None:
 def test_dither_feels_5_newton_at_rest() -> None:
     found, run = resting(5.0, **{"timing.dither_cycle": 40})
     assert found.in_contact
-    assert found.link == "outer_link"
-    assert abs(found.position - 0.28) < max(0.03, 2.0 * found.position_sd)
-    assert np.linalg.norm(np.subtract(found.force, (0.0, 4.0, 3.0))) < 1.0
+    assert found.best.cover == "outer_link"
+    assert abs(found.best.position - 0.28) < max(0.03, 2.0 * found.best.position_sd)
+    assert np.linalg.norm(np.subtract(found.best.force, (0.0, 4.0, 3.0))) < 1.0
     tip = [row.values[:4] for row in run.rows["sim/joint_states"][60:100]]
     moved = np.ptp([RigidBody(WAM).tool_pose(q).position for q in tip], axis=0)
     assert 0.0 < np.linalg.norm(moved) < 0.6e-3

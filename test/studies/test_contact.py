@@ -39,11 +39,7 @@ def hypothesis(cover: str, probability: float, place: float = NAN, sd: float = N
 
 
 def moment(i: int, hypotheses: tuple[Hypothesis, ...], speed: float, error: float) -> EstimatedMoment:
-    best = hypotheses[0] if hypotheses else hypothesis("", NAN)
-    estimate = ContactEstimate(
-        (error, 0.0, 0.0, 0.0), (0.5,) * 4, 0.0, bool(hypotheses), best.cover, best.position, best.position_sd,
-        best.probability, 0.1, best.force, best.moment, hypotheses, NO_REASON,
-    )  # fmt: skip
+    estimate = ContactEstimate((error, 0.0, 0.0, 0.0), (0.5,) * 4, 0.0, hypotheses)
     return EstimatedMoment((i + 1) * PERIOD, estimate, speed > 0.1)
 
 

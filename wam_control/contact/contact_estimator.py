@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import ContactFusion
-from wam_control.contact.contact_inference import ContactInference, Hypothesis, detection_statistic
+from wam_control.contact.contact_inference import NO_HYPOTHESIS, ContactInference, Hypothesis, detection_statistic
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.momentum_observer import MomentumObserver
@@ -21,7 +21,7 @@ from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import ZERO, State
+from wam_description.signals import State
 from wam_description.small_matrices import inverse
 
 Array = NDArray[np.float64]
@@ -56,15 +56,6 @@ class ContactEstimate(NamedTuple):
     external_torques : (n,), torques of the world on the joints, N m.
     torque_sd : (n,), their standard deviations, N m.
     statistic : r^T S^-1 r of the external torques; that of a second, faster estimate of them where that counts more.
-    in_contact : whether a contact is detected.
-    link : name of the cover in contact, '' without contact.
-    position : contact position, m along the cover's x axis, NaN where it cannot be observed.
-    position_sd : m, NaN where the position is.
-    probability : that this link is in contact, NaN without contact.
-    direction_sd : rad, of the angle of the force about the link, NaN without contact.
-    force : (3,), N, of the world on the link, in the cover's frame; zeros without contact, the
-        smallest possible force where the position is NaN.
-    moment : (3,), N m, of that force about the origin of the cover's frame.
     hypotheses : every explanation, the most probable first, empty without contact.
     reasons : why the position is NaN, the estimate not reliable, or why there is none.
     warning : `Code.MODEL_OFF` with the part of the model that is off; None for none.
@@ -73,17 +64,19 @@ class ContactEstimate(NamedTuple):
     external_torques: tuple[float, ...]
     torque_sd: tuple[float, ...]
     statistic: float
-    in_contact: bool
-    link: str = ""
-    position: float = math.nan
-    position_sd: float = math.nan
-    probability: float = math.nan
-    direction_sd: float = math.nan
-    force: tuple[float, float, float] = ZERO
-    moment: tuple[float, float, float] = ZERO
     hypotheses: tuple[Hypothesis, ...] = ()
     reasons: Reason = NO_REASON
     warning: Event | None = None
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether a contact is detected."""
+        return bool(self.hypotheses)
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable explanation; `NO_HYPOTHESIS` without contact."""
+        return self.hypotheses[0] if self.hypotheses else NO_HYPOTHESIS
 
 
 class ContactEstimator:
@@ -187,7 +180,7 @@ class ContactEstimator:
             self._ended = -math.inf
             self._fusion.reset()
             reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
-            return ContactEstimate(torques, sd, 0.0, False, reasons=reason)
+            return ContactEstimate(torques, sd, 0.0, reasons=reason)
         precision = inverse(covariance)
         statistic = detection_statistic(torques, precision)
         late = self._late(residual, precision, statistic)
@@ -203,28 +196,12 @@ class ContactEstimator:
         if not self._in_contact:
             if was_in_contact:
                 self._fusion.reset()
-            return ContactEstimate(torques, sd, statistic, False, warning=observer.warning)
+            return ContactEstimate(torques, sd, statistic, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
         now = observer.moment() if parameters.inference.fusion_time else None
         hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
         hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
-        best = hypotheses[0]
-        return ContactEstimate(
-            external_torques=torques,
-            torque_sd=sd,
-            statistic=statistic,
-            in_contact=True,
-            link=best.cover,
-            position=best.position,
-            position_sd=best.position_sd,
-            probability=best.probability,
-            direction_sd=best.direction_sd,
-            force=best.force,
-            moment=best.moment,
-            hypotheses=hypotheses,
-            reasons=best.reasons,
-            warning=observer.warning,
-        )
+        return ContactEstimate(torques, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
 
     def _late(self, torques: list[float], precision: Array, statistic: float) -> float:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""

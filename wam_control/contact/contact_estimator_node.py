@@ -68,13 +68,14 @@ class ContactEstimatorNode:
         self._observe()
         self._follow_zero(inputs["external_torque_zero"])
         self.estimate = estimate = self._estimator.estimate(_is_pressing(inputs))
-        frame = estimate.link or BASE
+        best = estimate.best
+        frame = best.cover or BASE
         hypotheses = hypothesis_table(estimate.hypotheses, self._covers)
         outputs: dict[str, Any] = {
             "external_joint_torques": State([], [], list(estimate.external_torques)),
             "external_joint_torques_sd": State([], [], list(estimate.torque_sd)),
-            "contact/wrench": Wrench(frame, estimate.force, estimate.moment),
-            "contact/point": Point(frame, (estimate.position, 0.0, 0.0)),
+            "contact/wrench": Wrench(frame, best.force, best.moment),
+            "contact/point": Point(frame, (best.position, 0.0, 0.0)),
             "contact/hypotheses": hypotheses,
         }
         if self._timing.is_display(inputs.stamp):

@@ -21,6 +21,7 @@ from wam_description.arm import Arm
 from wam_description.parameters import aligned, require, rows
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
+from wam_description.signals import ZERO
 from wam_description.small_matrices import inverse
 from wam_description.units import STANDARD_GRAVITY
 
@@ -67,6 +68,11 @@ class Hypothesis(NamedTuple):
     moment: Triple
     residual: float
     reasons: Reason
+
+
+NO_HYPOTHESIS = Hypothesis(
+    "", *(math.nan,) * 5, ZERO, math.nan, False, math.nan, math.nan, ZERO, math.nan, NO_REASON
+)  # without contact
 
 
 class _Cover(NamedTuple):

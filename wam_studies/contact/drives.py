@@ -211,13 +211,13 @@ def names_payload(estimate: ContactEstimate) -> bool:
 
 def _mass(contact: TrueContact, moments: Sequence[EstimatedMoment]) -> MassOutcome:
     acting = [one.estimate for one in compress(moments, during(moments, contact.begin, contact.end))]
-    linked = [one.in_contact and one.link != PAYLOAD for one in acting]
+    linked = [one.in_contact and one.best.cover != PAYLOAD for one in acting]
     named = [names_payload(one) for one in acting]
     return MassOutcome(
         mass=contact.mass,
         detected=any(linked) or any(named),
         named=any(named),
-        wrong=any(is_sure_and_wrong(one, contact.cover) and one.link != PAYLOAD for one in acting),
+        wrong=any(is_sure_and_wrong(one, contact.cover) and one.best.cover != PAYLOAD for one in acting),
         lasting=linked[-1] and not named[-1],
     )
 

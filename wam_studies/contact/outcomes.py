@@ -129,12 +129,12 @@ class ContactOutcome(NamedTuple):
 def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length: float) -> ContactOutcome:
     """What was reported of a contact in the moments of the whole run, on a cover of this length, m."""
     now = moments[contact.due].estimate
-    best = now.hypotheses[0] if now.hypotheses else None
+    best = now.best
     carries = payload_probability(now) if contact.mass else 0.0
-    is_named = best is not None and best.cover == contact.cover
+    is_named = best.cover == contact.cover
     own = [one for one in now.hypotheses if one.cover == contact.cover]
-    right = is_named or (best is not None and carries > best.probability)
-    known = best if is_named and best is not None and not math.isnan(best.position) else None
+    right = is_named or carries > best.probability
+    known = best if is_named and not math.isnan(best.position) else None
     times = [m.time - contact.since for m in moments[contact.first : contact.last + 1] if m.estimate.in_contact]
     already = contact.first > 0 and moments[contact.first - 1].estimate.in_contact
     place = min(contact.position, length)
@@ -145,11 +145,11 @@ def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length:
         moving=moments[contact.first].is_moving and moments[contact.due].is_moving,
         latency=math.nan if already else times[0] if times else math.inf,
         detected=now.in_contact,
-        probability=best.probability if best else math.nan,
+        probability=best.probability,
         right_link=right,
-        link=best.cover if best else "",
+        link=best.cover,
         error=abs(known.position - contact.position) if known else math.inf,
-        position_sd=best.position_sd if right and best else math.nan,
+        position_sd=best.position_sd if right else math.nan,
         in_set=carries > EVALUATION.outside or any(one.low - 1e-6 <= place <= one.high + 1e-6 for one in own),
         sure_and_wrong=sum(wrong) * (moments[1].time - moments[0].time),
     )
@@ -157,7 +157,7 @@ def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length:
 
 def is_sure_and_wrong(estimate: ContactEstimate, cover: str) -> bool:
     """Whether a link is reported with certainty that is not the touched one."""
-    return estimate.in_contact and estimate.probability > EVALUATION.sure and estimate.link != cover
+    return estimate.in_contact and estimate.best.probability > EVALUATION.sure and estimate.best.cover != cover
 
 
 def payload_probability(estimate: ContactEstimate) -> float:
