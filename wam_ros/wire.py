@@ -1,6 +1,7 @@
 """The codec between bytes on the wire (CDR) and values.
 
-The types that carry numbers, and the clock, have a fast path: messages of one layout differ in their numbers alone.
+The types that carry numbers, and the clock, have a fast path, but for points: messages of one layout differ in their
+numbers alone.
 Whatever has another layout (another byte order, other names or their order, other arrays) goes through a message object
 and `wam_ros.messages`.  Both give the same values, which are checked alike.  Padding is written as zeros.
 benchmarks/README.md shows the gain.
@@ -16,10 +17,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_bag import value_messages
 from wam_bag.cdr import first_stamp
-from wam_bag.value_messages import Encode, joint_states, points, tables, wrenches
+from wam_bag.value_messages import Encode, joint_states, tables, wrenches
 from wam_description.arm import Arm, Shared
 from wam_description.defects import defect_finder, frames, owners
-from wam_description.signals import NodeStatus, Point, State, Table, Wrench
+from wam_description.signals import NodeStatus, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
 from wam_description.wiring import mask
 from wam_ros.limits import NODE_LIMITS
@@ -135,8 +136,8 @@ def _finder(topic: Topic, arm: Arm) -> Decode:
         known = [(joint_states(names, counts).numbers, _as_state) for counts in product((len(names), 0), repeat=3)]
     elif topic.type == WRENCH:
         known = [(wrenches(frame).numbers, partial(_as_wrench, frame)) for frame in frames(arm)]
-    else:
-        known = [(points(frame).numbers, partial(_as_point, frame)) for frame in frames(arm)]
+    else:  # points, which no node takes in every period
+        known = []
 
     def find(data: bytes) -> Any:
         for layout in known:
@@ -157,10 +158,6 @@ def _as_state(numbers: Numbers) -> State:
 
 def _as_wrench(frame: str, numbers: Numbers) -> Wrench:
     return Wrench(frame, numbers[0][:3], numbers[0][3:])
-
-
-def _as_point(frame: str, numbers: Numbers) -> Point:
-    return Point(frame, numbers[0])
 
 
 def _find_table(columns: tuple[str, ...], frames: tuple[str, ...], most: int, data: bytes) -> Table | None:
