@@ -221,7 +221,7 @@ class _Copy:
 def _is_listed(path: Path, names: list[str]) -> bool:
     """Whether the metadata.yaml of a bag lists these files."""
     try:
-        return [file.name for file in files(path)] == names
+        return (path / "metadata.yaml").exists() and [file.name for file in files(path)] == names
     except BagError:
         return False
 

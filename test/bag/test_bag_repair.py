@@ -117,6 +117,9 @@ def test_a_repair_that_is_killed_can_be_done_again(tmp_path: Path) -> None:
         repair(bag)
         assert serialized(bag) == written(samples)
         assert {path.name for path in bag.iterdir()} == {f"bag{k}_0.mcap", "metadata.yaml"}
+    (bag / "metadata.yaml").unlink()  # as where it is killed before this is written
+    repair(bag)
+    assert (bag / "metadata.yaml").is_file()
 
 
 def test_a_repair_that_is_killed_before_its_last_step_has_changed_nothing(tmp_path: Path) -> None:

@@ -21,7 +21,8 @@ from wam_ros.topics import qos
 
 OWN = digests(WAM.shared)
 SERVO = WAM.shared.servo
-SOFT = [0.1 * gain for gain in SERVO.proportional_gain]  # the guard of the force loop does not accept it
+SOFT = [0.1 * gain for gain in SERVO.proportional_gain]
+REFUSING = {"force_loop:guard.mode": "refuse"}  # does not accept these gains; the packaged guard lowers its own
 HEAVY = {"arm.payload": 1.5}
 FEWER = {"nodes": [name for name in SIX if name != "gravity"]}
 MANY = {"arm.payload": 1.5, "ages.command": 0.3, "motion.speed": 0.3, "motion.jerk": 9.0, "timing.dither_cycle": 8}
@@ -195,7 +196,7 @@ def test_after_restarts_the_driver_names_the_reason_and_the_time_goes_on_when_it
 def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_the_arm_braked(
     ros: Network, tmp_path: Path
 ) -> None:
-    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
+    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}, "force_loop": REFUSING})
     assert stack.refusal().startswith("refused: force_loop: velocity_loop uses servo.* that are not accepted here: ")
     assert stack.force_servo() == SERVO
     stack.set("velocity_loop", servo__proportional_gain=list(SERVO.proportional_gain))
@@ -207,7 +208,7 @@ def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_th
 
 
 def test_a_follower_tries_the_gains_again_when_its_own_parameters_change(ros: Network, tmp_path: Path) -> None:
-    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
+    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}, "force_loop": REFUSING})
     ros.wait(stack.problem, what="gains that are not accepted")
     stack.set("force_loop", guard__mode="warn")
     assert stack.force_servo().proportional_gain == tuple(SOFT)
