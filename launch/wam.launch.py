@@ -22,9 +22,9 @@ from launch_ros.actions import Node
 from launch import LaunchContext, LaunchDescription
 from wam_control.task.scenario import load_for, script_file
 from wam_description.configuration import Configuration, option_values, packaged
-from wam_description.interface import process_groups
 from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf
+from wam_ros.processors import placed_groups
 from wam_ros.run import NAMESPACE, PARENT
 
 CONFIGURED = "configured"
@@ -100,9 +100,9 @@ def start_nodes(context: LaunchContext) -> list[Any]:
             ros_arguments=["--log-level", given["log_level"]],
             namespace=namespace,
             parameters=[str(parameters)],
-            **ends,
+            **{**ends, "additional_env": {**ends["additional_env"], **place}},
         )
-        for group in process_groups(configuration.shared.nodes, processes)
+        for group, place in placed_groups(configuration.shared, processes)
     ]
     return [*nodes, *viewers]
 

@@ -5,20 +5,22 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
+from types import MappingProxyType
 from typing import Final
 
 from rclpy.logging import get_logger
 
 from wam_description.configuration import Configuration
-from wam_description.interface import declared, process_groups, require_parameters
+from wam_description.interface import declared, require_parameters
 from wam_description.nodes import EACH, ONE
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.network import require_places
 from wam_ros.node import make_node, parameter_file
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
+from wam_ros.processors import placed_groups
 from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory
 from wam_ros.topics import NAMESPACE
 
@@ -77,6 +79,7 @@ class NodeProcess(Closing):
     entries : of the parameter `nodes`.
     namespace : of the nodes.
     log_level : least severity of what they print.
+    place : environment in which the process finds its processors.
     """
 
     def __init__(
@@ -85,13 +88,14 @@ class NodeProcess(Closing):
         entries: Sequence[str],
         namespace: str,
         log_level: str = "error",
+        place: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         prepare_logging_directory()
         self._stack = ExitStack()
         file = self._stack.enter_context(parameter_file(configuration))
         self._command = [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", "--params-file", str(file)]
         self._command += ["-r", f"__ns:=/{namespace.strip('/')}", "--log-level", log_level]
-        self._environment = {**os.environ, PARENT: str(os.getpid())}
+        self._environment = {**os.environ, PARENT: str(os.getpid()), **place}
         self.start()
 
     def start(self) -> None:
@@ -166,8 +170,8 @@ class Processes(Closing):
         names = node_names(configuration)
         self.killed: list[str] = []
         self.processes = {
-            ", ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level)
-            for group in process_groups(configuration.shared.nodes, processes)
+            ", ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
+            for group, place in placed_groups(configuration.shared, processes)
         }
 
     def ended(self) -> dict[str, int]:

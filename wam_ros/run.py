@@ -27,6 +27,7 @@ from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
+from wam_ros.processors import keep_to_processors
 from wam_ros.topics import NAMESPACE
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
@@ -232,7 +233,8 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
 
     with connection:
         signal.signal(LISTENER_GONE, lambda *_: setattr(connection, "listener_gone", True))
-        for node in nodes.values():  # all threads are there
+        keep_to_processors(os.environ)  # all threads are there
+        for node in nodes.values():
             getattr(node, "raise_priority", lambda: None)()
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         connection.spin(is_over, end)

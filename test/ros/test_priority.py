@@ -3,13 +3,8 @@
 import os
 import subprocess
 import sys
-import time
 
 import pytest
-from conftest import LONG
-
-from wam_description.configuration import Configuration, packaged
-from wam_ros.bring_up import Processes
 
 OWN = f"{{{os.getpriority(os.PRIO_PROCESS, 0)}}}"  # niceness of the tests, which a started program inherits
 PROGRAM = """
@@ -100,30 +95,3 @@ def test_a_process_that_takes_a_whole_processor_gives_its_priority_back(used: fl
     gives_back = granted != "usual" and used > 1.7
     assert looks == f"False {gives_back} {'usual' if gives_back or granted == 'usual' else granted}"
     assert is_usual == str(gives_back or granted == "usual")
-
-
-ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
-REALTIME = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ENTRIES})
-ASKED = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))", "import os; os.nice(-1)"
-
-
-def test_in_realtime_the_inner_loop_is_ahead_of_the_outer_nodes_as_far_as_the_system_grants_it(domain_id: int) -> None:
-    fifo, nice = (not subprocess.call([sys.executable, "-c", text], stderr=subprocess.DEVNULL) for text in ASKED)
-    timing, own = REALTIME.shared.timing, os.getpriority(os.PRIO_PROCESS, 0)
-    niceness = timing.niceness if nice and not fifo else own
-    expected = dict.fromkeys(ENTRIES, (timing.fifo_priority * fifo, niceness))
-    if fifo:
-        expected["contact_estimator"] = timing.fifo_priority - 1, niceness
-
-    def has_priorities() -> bool:
-        pids = {name: process.pid for name, process in processes.processes.items()}
-        return expected == {
-            name: (os.sched_getparam(pid).sched_priority, os.getpriority(os.PRIO_PROCESS, pid))
-            for name, pid in pids.items()
-        }
-
-    with Processes(REALTIME) as processes:
-        end = time.monotonic() + LONG
-        while not has_priorities():
-            assert time.monotonic() < end, "a process has another priority"
-            time.sleep(0.02)
