@@ -121,7 +121,7 @@ class ArmDriver(StackNode):
     def estop(self) -> Answer:
         """Stop at once and latch a fault."""
         self.trip(fault("emergency_stop"))
-        return Answer(True, f"fault: emergency stop; {self.safety.held}; call reset_fault, then enable")
+        return self.safety.stopped
 
     def end(self) -> None:
         """Put on the brakes at once; the others hear of it when the node is destroyed."""

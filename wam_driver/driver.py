@@ -319,7 +319,7 @@ class Driver:
     def estop(self) -> Answer:
         """Stop at once and latch a fault, as a node of a direct run may request."""
         self.fault(fault("emergency_stop"))
-        return Answer(True, f"fault: emergency stop; {self.safety.held}; call reset_fault, then enable")
+        return self.safety.stopped
 
     def reset_fault(self) -> Answer:
         """Clear a latched fault; the arm stays braked."""

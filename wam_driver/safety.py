@@ -38,6 +38,11 @@ class Safety:
         """The faults in words, '' where there is none."""
         return "; then ".join(map(sentence, self.events))
 
+    @property
+    def stopped(self) -> Answer:
+        """The answer to an emergency stop, of which the fault is latched."""
+        return Answer(True, f"fault: emergency stop; {self.held}; call reset_fault, then enable")
+
     def enable(self, obstacle: str) -> Answer:
         """Let the motors follow commands, unless `obstacle` names a reason against it."""
         if self.mode is Mode.FAULT:
