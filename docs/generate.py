@@ -59,7 +59,6 @@ import moving_picture  # noqa: E402
 CONFIGURATION = ROOT / "config" / "wam.yaml"
 SAMPLES = ROOT / "bags" / "sample"
 CLAIMS = ROOT / "docs" / "thesis.yaml"
-WRITES_PICTURES = __name__ == "__main__" and "--pages" not in sys.argv
 DITHER_CYCLE, DITHER_POSE = 40, (0.1, -0.9, 0.2, 0.9)  # periods; rad
 LISTED = 4  # elements of a list in the table of parameters
 CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
@@ -232,14 +231,10 @@ def found_figures() -> dict[str, Panels]:
         return numbers(list(FIGURES), executor, default_file("figures"))
 
 
-@cache
-def figures() -> str:
-    """Distances of the plant from the lines of the thesis's figures; also draws the figures."""
-    found = found_figures()
-    if WRITES_PICTURES:
-        for name, values in found.items():
-            draw_panels(values, file_of(name, ROOT / "docs" / "figures"))
-    return figures_table(found)
+def draw_figures() -> None:
+    """Draw the thesis's figures."""
+    for name, values in found_figures().items():
+        draw_panels(values, file_of(name, ROOT / "docs" / "figures"))
 
 
 def blocks() -> dict[str, Callable[[], str]]:
@@ -258,7 +253,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         ),
         "dither": lambda: dither(configuration),
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
-        "figures": figures,
+        "figures": lambda: figures_table(found_figures()),
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
         "recorded dynamic range": lambda: recorded_range(configuration),
@@ -434,6 +429,7 @@ DRAWN = {
     "demonstration": partial(demonstrate, "wam.yaml", "demo", is_moving=True),
     "barrett": partial(demonstrate, "barrett-wam7.yaml", "barrett-demo"),
     "tasks": draw_tasks,
+    "figures": draw_figures,
     "concepts": draw_motor_space,
     "examples": run_examples,
 }
