@@ -277,8 +277,8 @@ TOPICS: Final = (
     _joints(
         "external_torque_zero",
         "outer",
-        "effort = torques of the joint sensors that count as zero force, N m; set by `wam call tare` and when a force "
-        "begins; the estimator corrects the arm's weight with them",
+        "effort = torques of the joint sensors that count as zero force, N m. They are set by `wam call tare` and when "
+        "a force begins. The estimator corrects the arm's weight with them",
     ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
