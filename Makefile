@@ -76,7 +76,7 @@ bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of 
 soak: $(INSTALLED)  ## run the nodes for SOAK_SECONDS (600): memory, lost messages; the figures go into docs/safety.md
 	@$(VENV)/bin/wam evaluate soak --fresh --seconds $(SOAK_SECONDS) --write docs/safety.md $(ARGS)
 
-docs: $(STAMPS)/docs $(INSTALLED)  ## regenerate the pages of docs/, build the site docs/_build/html; ARGS="--pages" for text only
+docs: $(STAMPS)/docs $(INSTALLED)  ## regenerate the pages of docs/, build the site docs/_build/html; ARGS="--pages [docs/PAGE.md ...]" for text only
 	@$(PY) docs/generate.py $(ARGS)
 	@$(SITE)
 

@@ -30,7 +30,7 @@ from wam_description.configuration import Configuration
 from wam_description.driver_contract import REQUIREMENTS
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
-from wam_description.parameters import Field, fields
+from wam_description.parameters import fields
 from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
@@ -132,17 +132,10 @@ def steps(configuration: Configuration) -> str:
 def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
     """One row for each parameter of a class; a star marks one that can be set while the node runs."""
     for field in fields(cls):
-        value = short(given[field.name]) if field.name in given else off_value(field)
+        default = "as in arm" if field.follows else "" if field.default is None else field.default
+        value = short(given.get(field.name, default))
         allowed = f"{field.allowed} {field.unit}".strip() or field.kind.__name__
         yield [f"`{field.name}`{'*' * field.live}", f"`{value}`" if value else "empty", allowed, field.doc]
-
-
-def off_value(field: Field) -> str:
-    """Value of a parameter that no configuration gives: that of an option which is off, or of the same in `arm`."""
-    try:
-        return short(field.derived({})) if field.derived else ""
-    except LookupError:
-        return "as in arm"
 
 
 def short(value: Any) -> str:
@@ -366,11 +359,12 @@ def filled(text: str) -> str:
     return BLOCK.sub(lambda found: f"{found[1]}\n{known[found['name']]()}\n{found[3]}", text)
 
 
-def pages() -> dict[Path, str]:
-    """Every page with generated blocks, and the table of claims, up to date."""
-    texts = {path: path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]}
+def pages(chosen: Sequence[Path] = ()) -> dict[Path, str]:
+    """Pages with their generated blocks up to date: the chosen ones; or every one, and the table of claims."""
+    every = chosen or [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
+    texts = {path: path.read_text(encoding="utf-8") for path in every}
     found = {path: filled(text) for path, text in texts.items() if BLOCK.search(text)}
-    return {**found, CLAIMS.with_suffix(".csv"): every_claim()}
+    return found if chosen else {**found, CLAIMS.with_suffix(".csv"): every_claim()}
 
 
 def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
@@ -439,16 +433,18 @@ def main() -> None:
     """Draw the pictures, then write the pages."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=DRAWN, default="", help="nothing but these pictures, and what goes with them")
-    parser.add_argument("--pages", action="store_true", help="pages only, without demonstration")
+    parser.add_argument(
+        "--pages", nargs="*", type=ROOT.joinpath, metavar="PAGE", help="no pictures; only these pages, or all of them"
+    )
     given = parser.parse_args()
     if given.only:
         DRAWN[given.only]()
         return
-    if not given.pages:
+    if given.pages is None:
         (ROOT / "docs" / "elbow.txt").write_text(elbow_table(Configuration.load(CONFIGURATION)), encoding="utf-8")
         for draw in DRAWN.values():
             draw()
-    for path, text in pages().items():  # last: they have numbers of the demonstration
+    for path, text in pages(given.pages or ()).items():  # last: they have numbers of the demonstration
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))
 
