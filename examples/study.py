@@ -13,9 +13,10 @@ import numpy as np
 from wam_cli.commands.evaluate import program
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
+from wam_description.parameters import parameter
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.scores import Row, Scores, exact
 
 
@@ -42,7 +43,7 @@ class PressStudy(Study[Press, float]):
 
     title: ClassVar[str] = "forces on the testbed"
     base: ClassVar[str] = "testbed"
-    seconds: float = option(2.0, "of each force", 1.0)
+    seconds: float = parameter("duration of each force", "s", low=1.0, default=2.0)
     run = staticmethod(press)
 
     def cases(self, seed: int) -> Iterator[Press]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
-from wam_description.parameters import aligned, lengths, named, parameter, require, rows, tunable
+from wam_description.parameters import aligned, lengths, named, parameter, require, rows
 from wam_description.parts import Joints, Links, Motors
 from wam_description.thresholds import FILES, MODEL
 from wam_description.units import STANDARD_GRAVITY
@@ -304,8 +304,8 @@ class Timing:
 class Servo:
     """Gains of the velocity loop of each motor; the velocity loop uses them, the stability guard relies on them."""
 
-    proportional_gain: tuple[float, ...] = tunable("motor torque per velocity error", "N m s/rad")
-    integral_gain: tuple[float, ...] = tunable("motor torque per angle error", "N m/rad")
+    proportional_gain: tuple[float, ...] = parameter("motor torque per velocity error", "N m s/rad", live=True)
+    integral_gain: tuple[float, ...] = parameter("motor torque per angle error", "N m/rad", live=True)
 
 
 def seconds(nanoseconds: int) -> float:

@@ -28,9 +28,7 @@ class Cables:
     stage_motors: tuple[str, ...] = parameter(
         "motor to which each stage belongs; its stages in order from the motor to the joint"
     )
-    stage_ea: tuple[float, ...] = parameter(
-        "elastic modulus times area, E A, of one cable of the stage", "N", low=1.0, high=1e9
-    )
+    stage_ea: tuple[float, ...] = parameter("elastic modulus times area, E A, of one cable of the stage", "N", low=1.0)
     stage_length: tuple[float, ...] = parameter("free length of a strand", "m", high=10.0)
     stage_radius: tuple[float, ...] = parameter("radius of the stage's driving pulley", "m", low=1e-4, high=1.0)
     stage_circuits: tuple[float, ...] = parameter("parallel circuits of the stage", low=1.0, high=100.0)

@@ -24,7 +24,7 @@ PARAMETERS = "ros__parameters"
 LENGTHS = ("arm.covers.length", "arm.joints.length", "arm.joints.offset")
 MASSES = ("arm.links.mass", "arm.links.centre", "arm.links.inertia")
 SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
-_DERIVED = frozenset(field.name for field in fields(Shared) if field.derived)  # a file need not give them
+_NOT_REQUIRED = frozenset(field.name for field in fields(Shared) if not field.is_required)  # a file need not give them
 
 
 class Configuration(NamedTuple):
@@ -111,7 +111,7 @@ class Configuration(NamedTuple):
         for key, value in values.items():
             node, colon, parameter = key.rpartition(":")
             flat = sections[self._section(node) if colon else SHARED]
-            if parameter not in flat and (colon or parameter not in _DERIVED):
+            if parameter not in flat and (colon or parameter not in _NOT_REQUIRED):
                 where = f"node '{node}'" if colon else "section '/**'"
                 meant = self._meant(key, parameter, flat)
                 raise ParameterError(

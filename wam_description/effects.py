@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wam_description.arm import Arm
-from wam_description.parameters import aligned, each, empty, option, parameter, require, rows, tunable
+from wam_description.parameters import aligned, each, empty, parameter, require, rows
 from wam_description.parts import Motors
 
 
@@ -57,18 +57,19 @@ class Effects:
         "true: the friction in arm.motors was measured, so it includes friction by tension and ripples (7.2.2), and "
         "the plant's dry friction is the rest; false: both are added to it",
     )
-    added_coulomb_friction: tuple[float, ...] = tunable(
-        "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0
+    added_coulomb_friction: tuple[float, ...] = parameter(
+        "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0, live=True
     )
-    terminated: bool = option(
+    terminated: bool = parameter(
         "true if the cables end on both pulleys, which bounds their creep (6.4.3): each part creeps by half of "
         "(6.19), and only once for each load under which it is wound",
-        off=False,
+        default=False,
     )
-    capstan: float = option(
+    capstan: float = parameter(
         "friction coefficient times angle of wrap on the pinion: at tensions beyond (6.16) the whole cable slips; 0: "
         "it never slips",
         high=50.0,
+        default=0.0,
     )
 
     def require_fit(self, arm: Arm) -> None:

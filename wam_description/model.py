@@ -73,7 +73,7 @@ class ModelCovariance:
         "names of the identified parameters, as motors.coulomb_positive.motor1; none: nothing was identified"
     )
     values: tuple[float, ...] = parameter(
-        "covariance of these parameters, row by row", "products of their units", low=-1e9, high=1e9
+        "covariance of these parameters, row by row", "products of their units", low=-1e9
     )
 
     def __post_init__(self) -> None:

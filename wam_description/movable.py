@@ -50,10 +50,9 @@ class FreeBodies(Countable):
         "stiffness of each point of contact with obstacles, doors and other bodies; a box lies on four points",
         "N/m",
         low=1.0,
-        high=1e9,
     )
     ground_damping: tuple[float, ...] = parameter("damping of each such point", "N s/m", high=1e6)
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0)
     damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
 
     def __post_init__(self) -> None:
@@ -89,7 +88,7 @@ class Doors(Countable):
     lower: tuple[float, ...] = parameter("smallest angle of the door", "rad", low=-6.3, high=6.3)
     upper: tuple[float, ...] = parameter("largest angle of the door", "rad", low=-6.3, high=6.3)
     friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0)
     damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
 
     def __post_init__(self) -> None:

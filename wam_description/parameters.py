@@ -5,11 +5,10 @@ nowhere else.  The same classes check the values, describe the parameters to ROS
 ``docs/parameters.md``.
 """
 
-import contextlib
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
@@ -54,7 +53,13 @@ class Field(NamedTuple):
     width: int
     is_common: bool
     length: int
-    derived: Callable[[Mapping[str, Any]], Value] | None
+    default: Value | None
+    follows: str
+
+    @property
+    def is_required(self) -> bool:
+        """Whether every configuration has to give its value."""
+        return self.default is None and not self.follows
 
     @property
     def allowed(self) -> str:
@@ -63,56 +68,50 @@ class Field(NamedTuple):
             return "one of " + ", ".join(self.choices)
         if self.kind in (str, bool):
             return ""
-        return f"at least {self.low:g}" if math.isinf(self.high) else f"{self.low:g} to {self.high:g}"
+        return f"{self.low:g} to {self.high:g}"
 
 
 def parameter(
     doc: str,
     unit: str = "",
     low: float = 0.0,
-    high: float = math.inf,
+    high: float = 1e9,
+    *,
     choices: tuple[str, ...] = (),
     live: bool = False,
     width: int = 1,
     is_common: bool = False,
     length: int = 0,
-    derived: Callable[[Mapping[str, Any]], Value] | None = None,
+    default: Value | None = None,
+    follows: str = "",
 ) -> Any:
-    """Declare a field of a parameter class.
+    """Declare a field of a parameter class.  One that every configuration has to give has no `default`.
 
     Parameters
     ----------
     doc : what the parameter is, one sentence.
     unit : SI unit, empty for pure numbers and names.
-    low, high : inclusive range of each number; not negative unless `low` is given.
+    low, high : inclusive range of each number.
     choices : allowed strings.
     live : True if a running node may take a new value.
     width : of a list, the number of values for each of what it runs over, see `aligned`.
     is_common : of a list, whether a single value counts for all.
     length : of a list that runs over nothing with names, the number of its values; 0 for any.
-    derived : the value where a configuration does not give one, a function of the other parameters of its section,
-        see `like`.
+    default : the value where a configuration gives none.  The field is then an argument by keyword, so it can be
+        anywhere in its class.
+    follows : the parameter whose value it has where a configuration gives none, see `like`.
     """
-    return dataclasses.field(
-        metadata={
-            "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live,
-            "width": width, "is_common": is_common, "length": length, "derived": derived,
-        }
-    )  # fmt: skip
-
-
-def tunable(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9) -> Any:
-    """Declare numbers that a running node may change; as `parameter` else."""
-    return parameter(doc, unit, low, high, live=True)
-
-
-def option(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9, off: Value = 0.0) -> Any:
-    """Declare a parameter whose value is `off` where a configuration does not give one; as `parameter` else."""
-    return dataclasses.field(default=off, metadata=parameter(doc, unit, low, high, derived=lambda _: off).metadata)
+    metadata = {
+        "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live, "width": width,
+        "is_common": is_common, "length": length, "default": default, "follows": follows,
+    }  # fmt: skip
+    if default is None:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, kw_only=True, metadata=metadata)
 
 
 def like(cls: type, name: str, doc: str = "") -> Any:
-    """Declare a field that has unit, range and, without a configured value, the value of another parameter.
+    """Declare a field that has unit, range and, where a configuration gives none, the value of another parameter.
 
     Parameters
     ----------
@@ -121,9 +120,7 @@ def like(cls: type, name: str, doc: str = "") -> Any:
     doc : what the field is, where that is another sentence.
     """
     other = next(field for field in fields(cls) if field.name == name.rpartition(".")[2])
-    return parameter(
-        doc or other.doc, other.unit, other.low, other.high, width=other.width, derived=lambda others: others[name]
-    )
+    return parameter(doc or other.doc, other.unit, other.low, other.high, width=other.width, follows=name)
 
 
 _FIELDS: dict[type, tuple[Field, ...]] = {}
@@ -226,7 +223,7 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         names every missing and unknown parameter, or the first value that is not allowed.
     """
     known = {field.name: field for field in fields(cls)}
-    flat = {**_derived(known.values(), flat), **flat}
+    flat = {**_defaults(known.values(), flat), **flat}
     missing = [name for name in known if name not in flat]
     unknown = [name for name in flat if name not in known]
     if missing or unknown:
@@ -237,14 +234,10 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
     return _assemble(cls, {name: checked(field, flat[name]) for name, field in known.items()}, "")
 
 
-def _derived(known: Iterable[Field], flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Derived values; none of a parameter that follows from a missing one, which is then reported."""
-    found = {}
-    for field in known:
-        with contextlib.suppress(LookupError):
-            if field.derived is not None:
-                found[field.name] = field.derived(flat)
-    return found
+def _defaults(known: Iterable[Field], flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of parameters that need not be given; none of one that follows a missing one, which is then reported."""
+    found = {field.name: flat.get(field.follows, field.default) for field in known}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:

@@ -18,8 +18,8 @@ class Motors:
     names: tuple[str, ...] = parameter("motor names, as in JointState messages")
     inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9, high=1e5)
     torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6, high=100.0)
-    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", high=1e9)
-    continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6, high=1e9)
+    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m")
+    continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6)
     static_friction: tuple[float, ...] = parameter(
         "static friction F_s (breakaway torque) of rotor and first pinion", "N m", high=100.0
     )

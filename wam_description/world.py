@@ -14,7 +14,7 @@ from wam_description.movable import (
     Motions,
     require_solids,
 )
-from wam_description.parameters import aligned, empty, option, parameter, require, rows
+from wam_description.parameters import aligned, empty, parameter, require, rows
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
 NEEDED = {**SHAPES, "plane": 0}  # of these that have to be above 0
@@ -38,7 +38,7 @@ class Obstacles:
         high=100.0,
         width=3,
     )
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
     damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", high=1e6)
     hardening: tuple[float, ...] = parameter(
         "h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", high=1e6
@@ -55,7 +55,7 @@ class Springs(Countable):
 
     counted_by = "stiffness"
     joints: tuple[str, ...] = parameter("joint of each spring")
-    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", high=1e9)
+    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m")
     lever: tuple[float, ...] = parameter("distance of the spring from the axis of the joint", "m", low=1e-3, high=3.0)
     rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", low=-13.0, high=13.0)
     bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
@@ -103,7 +103,7 @@ class Pushers(Countable):
     )
     slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s", low=-10.0, high=10.0)
     turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s", low=-100.0, high=100.0)
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
     damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", high=1e6)
     friction: tuple[float, ...] = parameter("coefficient of friction against the cover", high=10.0)
 
@@ -122,9 +122,7 @@ class Pushers(Countable):
 class Folding:
     """Contact between the tubes of links that follow each other, as of a folded elbow."""
 
-    stiffness: float = parameter(
-        "stiffness of the contact of inner and outer tube; 0: they never touch", "N/m", high=1e9
-    )
+    stiffness: float = parameter("stiffness of the contact of inner and outer tube; 0: they never touch", "N/m")
     damping: float = parameter("damping", "N s/m", high=1e6)
     friction: float = parameter("friction coefficient", high=10.0)
     clearance: float = parameter(
@@ -158,8 +156,10 @@ class World:
     doors: Doors = NO_DOORS
     motions: Motions = NO_MOTIONS
     folding: Folding = NO_FOLDING
-    cover_stiffness: float = option(
-        "stiffness of the covers, in series with what they touch (1.1.1), except pushers and springs; 0: rigid", "N/m"
+    cover_stiffness: float = parameter(
+        "stiffness of the covers, in series with what they touch (1.1.1), except pushers and springs; 0: rigid",
+        "N/m",
+        default=0.0,
     )
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from typing import Protocol
 
-from wam_description.parameters import each, option, parameter
+from wam_description.parameters import each, parameter
 
 
 class FrictionLaw(Protocol):
@@ -167,19 +167,26 @@ class FrictionParameters:
     motor_presliding_stiffness: tuple[float, ...] = parameter(
         "elastic stiffness of each motor's friction before it slides; 0: it sticks rigidly",
         "N m/rad",
-        high=1e9,
         is_common=True,
     )
-    joint_presliding_stiffness: tuple[float, ...] = parameter(
-        "the same for each joint", "N m/rad", high=1e9, is_common=True
-    )
-    warm_drop: float = option(
+    joint_presliding_stiffness: tuple[float, ...] = parameter("the same for each joint", "N m/rad", is_common=True)
+    warm_drop: float = parameter(
         "fraction by which the dry friction of a motor is smaller when its winding is at its thermal limit; below the "
         "limit in proportion to the heat; 0: friction does not depend on temperature",
         high=0.9,
+        default=0.0,
     )
 
 
 COULOMB_STICTION = FrictionParameters(
-    "coulomb_stiction", (1.0,), (1.0,), 2.0, (0.0,), (0.0,), (0.0,), (0.0,), (0.0,), (0.0,)
+    law="coulomb_stiction",
+    motor_stribeck_velocity=(1.0,),
+    joint_stribeck_velocity=(1.0,),
+    stribeck_exponent=2.0,
+    motor_asymmetry=(0.0,),
+    joint_asymmetry=(0.0,),
+    motor_load_factor=(0.0,),
+    joint_load_factor=(0.0,),
+    motor_presliding_stiffness=(0.0,),
+    joint_presliding_stiffness=(0.0,),
 )

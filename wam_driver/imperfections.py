@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import option, parameter
+from wam_description.parameters import parameter
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,10 @@ class AmplifierParameters:
         low=-100.0,
         high=100.0,
     )
-    bandwidth: float = option("bandwidth of the current loop, of first order; 0: unlimited", "Hz", high=1e5)
-    delay: int = option("delay of the current loop, in periods", high=100, off=0)
+    bandwidth: float = parameter(
+        "bandwidth of the current loop, of first order; 0: unlimited", "Hz", high=1e5, default=0.0
+    )
+    delay: int = parameter("delay of the current loop, in periods", high=100, default=0)
 
 
 @dataclass(frozen=True)

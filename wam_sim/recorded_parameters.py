@@ -173,7 +173,7 @@ def _differences(node: str, recorded: Values) -> tuple[tuple[str, ...], tuple[st
     if node not in NODES or node == "recorder":
         return (), ()
     known = {field.name: field for cls in (Shared, declared(node).parameter_class) for field in fields(cls)}
-    missing = [name for name, field in known.items() if name not in recorded and field.derived is None]
+    missing = [name for name, field in known.items() if name not in recorded and field.is_required]
     return tuple(missing), tuple(name for name in recorded if name not in known)
 
 

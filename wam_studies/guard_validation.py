@@ -18,8 +18,9 @@ from wam_control.force.friction_verdict import friction_verdict, linear_margin, 
 from wam_control.force.stability_guard import GuardAssessment
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
+from wam_description.parameters import parameter
 from wam_sim.simulation import Simulation
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, grouped, percent, share
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 
@@ -85,8 +86,8 @@ class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
     seeds = (1,)
     base = "testbed"
 
-    sets: int = option(200, "random sets for the exact integrator", 1)
-    testbed: int = option(40, "random sets for the testbed in MuJoCo", 0)
+    sets: int = parameter("random sets for the exact integrator", low=1, default=200)
+    testbed: int = parameter("random sets for the testbed in MuJoCo", default=40)
 
     run = staticmethod(validate)
 

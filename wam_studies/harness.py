@@ -1,14 +1,14 @@
 """One harness for every study: seeds, progress, resume, processes or a cluster, results, command line and page.
 
-A study is a frozen dataclass below `Study` with three pure methods; its fields are its options.  `wam evaluate NAME`
-runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
+A study is a frozen dataclass below `Study` with three pure methods; each field that is a `parameter` with a default is
+an option.  `wam evaluate NAME` runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
 """
 
 import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -33,11 +33,6 @@ STUDIES: Final = {
     "identify": "wam_studies.identification.study:IdentificationStudy",
     "soak": "wam_studies.faults.soak:SoakStudy",
 }
-
-
-def option(default: Any, text: str, least: float | None = None, choices: Collection[str] = ()) -> Any:
-    """A field of a study that is an option: its default, what it is, the least value allowed, or the names allowed."""
-    return field(default=default, metadata={"text": text, "least": least, "choices": choices})
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from wam_control.task.scenario_node import ScenarioNode
 from wam_control.task.scenario_settings import Setting
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError, tunable
+from wam_description.parameters import ParameterError, parameter
 from wam_description.signals import NO_CONTACT, ZERO, Contact, PathPoint, PosturePath, State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, reaction
@@ -40,7 +40,7 @@ from wam_sim.simulation import Simulation
 
 @dataclass(frozen=True)
 class TunableParameters:
-    stride: float = tunable("a live number of a controller of one's own")
+    stride: float = parameter("a live number of a controller of one's own", live=True)
 
 
 DT = 0.005

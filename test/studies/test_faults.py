@@ -102,7 +102,7 @@ def test_escapes_are_counted_by_kind_and_each_is_listed() -> None:
 
 
 def test_cases_are_the_trials_of_each_kind() -> None:
-    found = list(FaultStudy(CONFIGURATION, ("parameters", "losses"), trials=2).cases(3))
+    found = list(FaultStudy(CONFIGURATION, kinds=("parameters", "losses"), trials=2).cases(3))
     names = [f"{kind} {number}, seed 3" for kind in ("parameters", "losses") for number in (0, 1)]
     assert [str(case) for case in found] == names
     assert all(case.configuration.shared.timing.mode == "lockstep" for case in found)
@@ -189,7 +189,7 @@ def test_nothing_escapes_from_a_trial_of_each_kind_in_one_process(domain_id: int
 @pytest.mark.slow
 def test_a_short_soak_loses_nothing(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
-    study = SoakStudy(in_lockstep(), 4.0)
+    study = SoakStudy(in_lockstep(), seconds=4.0)
     found = [study.run(case) for case in study.cases(1)]
     assert study.score(found).missed == []
     assert study.failure(found[0]) == ""

@@ -15,7 +15,8 @@ from arms import CONFIGURATION
 
 from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
-from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load, option
+from wam_description.parameters import parameter
+from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load
 from wam_studies.page import block, report, section_of, with_section
 from wam_studies.scores import (
     ANY,
@@ -61,7 +62,7 @@ class SquareStudy(Study[tuple[int, int], Square]):
 
     title: ClassVar[str] = "squares"
     count: ClassVar[int | None] = 3
-    limit: float = option(5.0, "largest square allowed", 1.0)
+    limit: float = parameter("largest square allowed", low=1.0, default=5.0)
     run = staticmethod(squared)
 
     def cases(self, seed: int) -> Iterator[tuple[int, int]]:
@@ -191,7 +192,7 @@ def test_the_options_of_a_study_are_those_of_the_harness_and_its_fields(
     monkeypatch.setattr(sys, "argv", ["study.py", "--seconds", "0.5"])
     with pytest.raises(SystemExit):
         program("press", example.PressStudy)
-    assert "argument --seconds: '0.5' is not allowed; give a number of at least 1" in capsys.readouterr().err
+    assert "argument --seconds: '0.5' is not allowed; give a number from 1 to 1e+09" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -62,25 +62,25 @@ def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study
 
 def _options(kind: type[Study[Any, Any]]) -> Iterator[Field[Any]]:
     """The fields of a study that are options."""
-    return (one for one in fields(kind) if "text" in one.metadata)
+    return (one for one in fields(kind) if "doc" in one.metadata)
 
 
 def _add(parser: argparse.ArgumentParser, one: Field[Any]) -> None:
     """Add the option of a field; its type is that of its default."""
-    name, default, text = f"--{one.name.replace('_', '-')}", one.default, one.metadata["text"].replace("%", "%%")
+    name, default, allowed = f"--{one.name.replace('_', '-')}", one.default, one.metadata
+    text = ", ".join(filter(None, (allowed["doc"], allowed["unit"]))).replace("%", "%%")
     if isinstance(default, bool):
         parser.add_argument(name, action="store_true", help=text)
     elif isinstance(default, tuple):
-        choices = one.metadata["choices"]
+        choices = allowed["choices"]
         given = ", ".join(shlex.quote(choice) for choice in choices).replace("%", "%%")
         chosen = "all of them" if default == choices else " ".join(default) or "none"
         text = f"{text}: {given}; default: {chosen}"
         parser.add_argument(name, nargs="+", choices=choices, default=default, metavar="NAME", help=text)
     else:
-        least = one.metadata["least"]
         kind: Any = type(default)
-        kind = kind if least is None else bounded(kind, least)
-        parser.add_argument(name, type=kind, default=default, help=f"{text}, default {default}")
+        within = bounded(kind, allowed["low"], allowed["high"])
+        parser.add_argument(name, type=within, default=default, help=f"{text}, default {default}")
 
 
 def run_study(given: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Servo
-from wam_description.parameters import tunable
+from wam_description.parameters import parameter
 from wam_description.rigid_body import RigidBody
 from wam_description.small_matrices import inverse
 from wam_description.transmission_map import TransmissionMap
@@ -30,31 +30,38 @@ ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 class SensingParameters:
     """What disturbs the measured force, and how exactly it has to be known."""
 
-    torque_sd: float = tunable("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3)
-    torque_fraction: float = tunable(
-        "further sd of each measured joint torque, per torque of the commanded force", high=1.0
+    torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True)
+    torque_fraction: float = parameter(
+        "further sd of each measured joint torque, per torque of the commanded force", high=1.0, live=True
     )
-    estimated_torque_sd: float = tunable("as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3)
-    estimated_torque_fraction: float = tunable(
-        "as torque_fraction, with feedback contact_estimate: torque constants and friction of the motors", high=1.0
+    estimated_torque_sd: float = parameter(
+        "as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True
     )
-    friction: float = tunable("sd of the tangential force on the link, per commanded force", high=2.0)
-    zero_limit: float = tunable(
+    estimated_torque_fraction: float = parameter(
+        "as torque_fraction, with feedback contact_estimate: torque constants and friction of the motors",
+        high=1.0,
+        live=True,
+    )
+    friction: float = parameter("sd of the tangential force on the link, per commanded force", high=2.0, live=True)
+    zero_limit: float = parameter(
         "largest external torque of a joint that counts as zero when a force begins at rest without an "
         "estimated contact; 0: none",
         "N m",
         high=1e3,
+        live=True,
     )
-    least_apparent_mass: float = tunable(
+    least_apparent_mass: float = parameter(
         "least apparent mass of the arm in the measured force; 0: no bound, which gives a smaller stable "
         "gain and a smaller error of oblique forces",
         "kg",
         high=100.0,
+        live=True,
     )
-    apparent_mass_limit: float = tunable(
+    apparent_mass_limit: float = parameter(
         "largest apparent mass; along directions with a larger one the motion is slower; 0: no limit",
         "kg",
         high=1e6,
+        live=True,
     )
 
     @property

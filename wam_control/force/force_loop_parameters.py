@@ -9,7 +9,7 @@ from wam_control.force.sampled_loop import Feedback
 from wam_control.force.stability_guard import GuardedTask, GuardParameters
 from wam_control.force.task import TaskParameters
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter, require, tunable
+from wam_description.parameters import lengths, parameter, require
 
 AXES = ("x", "y", "z")  # of the force command's frame
 
@@ -18,62 +18,77 @@ AXES = ("x", "y", "z")  # of the force command's frame
 class LimitParameters:
     """Where the force loop stops the arm."""
 
-    joint_gain: float = tunable(
+    joint_gain: float = parameter(
         "largest speed of a joint towards its end, per distance from it; 0: the ends are not watched",
         "1/s",
         high=100.0,
+        live=True,
     )
-    joint_acceleration: float = tunable(
+    joint_acceleration: float = parameter(
         "largest acceleration of a joint by commands, except away from a push; 0: no limit",
         "rad/s^2",
         high=1e4,
+        live=True,
     )
-    joint_margin: float = tunable("distance from the end of a joint at which it has to stop", "rad", high=1.0)
-    contact_force: float = tunable(
-        "largest force on the arm, as the joints measure it; above it the arm moves away", "N"
+    joint_margin: float = parameter(
+        "distance from the end of a joint at which it has to stop", "rad", high=1.0, live=True
     )
-    whole_force: float = tunable(
+    contact_force: float = parameter(
+        "largest force on the arm, as the joints measure it; above it the arm moves away", "N", live=True
+    )
+    whole_force: float = parameter(
         "largest whole force at the contact, as a multiple of the commanded force; above it the arm moves away",
+        live=True,
     )
-    impact: float = tunable(
+    impact: float = parameter(
         "largest predicted impact (3.1) on a surface of guard.contact_stiffness, as a multiple of the commanded "
         "force; it limits the speed before the contact; 0: no limit",
         high=1e3,
+        live=True,
     )
-    settling_time: float = tunable("time after which a force that is still not reached is reported", "s", low=1e-3)
-    free_travel: float = tunable(
+    settling_time: float = parameter(
+        "time after which a force that is still not reached is reported", "s", low=1e-3, live=True
+    )
+    free_travel: float = parameter(
         "largest travel along a commanded force that is not reached, or against it under a push; then "
         "the arm holds its position",
         "m",
+        live=True,
     )
-    tolerance: float = tunable(
-        "tolerated error of a force, as a fraction of the commanded force; up to it a force counts as reached"
+    tolerance: float = parameter(
+        "tolerated error of a force, as a fraction of the commanded force; up to it a force counts as reached",
+        live=True,
     )
-    doubt: float = tunable(
+    doubt: float = parameter(
         "largest ratio of predicted to tolerated error with which a force is applied; with a larger limit fewer "
         "forces are refused and more are wrong",
         low=0.01,
+        live=True,
     )
-    least_tolerance: float = tunable(
-        "error up to which a force counts as reached, however small the commanded force is", "N", high=1e3
+    least_tolerance: float = parameter(
+        "error up to which a force counts as reached, however small the commanded force is", "N", high=1e3, live=True
     )
-    cycle_force: float = tunable(
-        "swing of the measured force from which a limit cycle is reported, as a fraction of the commanded force"
+    cycle_force: float = parameter(
+        "swing of the measured force from which a limit cycle is reported, as a fraction of the commanded force",
+        live=True,
     )
-    shake_force: float = tunable(
+    shake_force: float = parameter(
         "with feedback contact_estimate: largest swing of the force due to the dither, on a surface of "
         "guard.contact_stiffness, as a fraction of the commanded force; above it the arm holds its position",
+        live=True,
     )
-    surface_speed: float = tunable(
+    surface_speed: float = parameter(
         "largest speed of the surface along the force; the lag of the force behind it counts as an error",
         "m/s",
         high=10.0,
+        live=True,
     )
-    slide_speed: float = tunable(
+    slide_speed: float = parameter(
         "largest speed of the surface across the force; a sloping surface approaches the arm while friction reverses, "
         "which counts as an error",
         "m/s",
         high=10.0,
+        live=True,
     )
 
 
@@ -93,52 +108,61 @@ class ForceLoopParameters:
     feedback: str = parameter(
         "source of the measured force F_c", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
     )
-    force_gain: tuple[float, ...] = tunable(
+    force_gain: tuple[float, ...] = parameter(
         "G_I of each axis x y z of the force command's frame, or one for all: velocity per force error",
         "m/s/N",
         high=100.0,
+        live=True,
     )
-    force_proportional_gain: tuple[float, ...] = tunable(
-        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", high=100.0
+    force_proportional_gain: tuple[float, ...] = parameter(
+        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", high=100.0, live=True
     )
-    force_error_limit: tuple[float, ...] = tunable(
-        "saturation of F_error of each axis, or one for all; above the deadband", "N"
+    force_error_limit: tuple[float, ...] = parameter(
+        "saturation of F_error of each axis, or one for all; above the deadband", "N", live=True
     )
-    force_deadband: tuple[float, ...] = tunable(
-        "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3
+    force_deadband: tuple[float, ...] = parameter(
+        "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3, live=True
     )
-    force_limit: float = tunable("largest force that may be commanded", "N", high=1e3)
-    torque_gain: tuple[float, ...] = tunable(
-        "G_I of each joint whose torque is commanded, or one for all", "rad/s/(N m)", high=100.0
+    force_limit: float = parameter("largest force that may be commanded", "N", high=1e3, live=True)
+    torque_gain: tuple[float, ...] = parameter(
+        "G_I of each joint whose torque is commanded, or one for all", "rad/s/(N m)", high=100.0, live=True
     )
-    torque_proportional_gain: tuple[float, ...] = tunable("G_P of each joint, or one for all", "rad/(N m)", high=100.0)
-    torque_error_limit: tuple[float, ...] = tunable(
-        "saturation of the torque error of each joint, or one for all; above the deadband", "N m"
+    torque_proportional_gain: tuple[float, ...] = parameter(
+        "G_P of each joint, or one for all", "rad/(N m)", high=100.0, live=True
     )
-    torque_deadband: tuple[float, ...] = tunable(
-        "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3
+    torque_error_limit: tuple[float, ...] = parameter(
+        "saturation of the torque error of each joint, or one for all; above the deadband", "N m", live=True
     )
-    torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
+    torque_deadband: tuple[float, ...] = parameter(
+        "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3, live=True
+    )
+    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", high=1e3, live=True)
     delay_samples: int = parameter(
         "additional delay of the velocity that the force law commands, in outer periods", low=0, high=20, live=True
     )
-    force_feedforward: float = tunable(
+    force_feedforward: float = parameter(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it "
         "accelerates a free arm towards the surface",
         high=1.0,
+        live=True,
     )
-    friction_feedforward: float = tunable(
+    friction_feedforward: float = parameter(
         "fraction of the model's dry friction that is fed forward along the commanded motion during a "
         "force; none with feedback contact_estimate",
         high=1.0,
+        live=True,
     )
-    posture_gain: float = tunable("joint velocity per error of the posture", "1/s", high=1e3)
-    joint_speed_limit: float = tunable("largest joint speed due to the posture and to the force", "rad/s", high=1e3)
-    force_filter: float = tunable("time constant of the low pass on the measured force", "s", high=10.0)
-    spring_stiffness: tuple[float, ...] = tunable(
-        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad"
+    posture_gain: float = parameter("joint velocity per error of the posture", "1/s", high=1e3, live=True)
+    joint_speed_limit: float = parameter(
+        "largest joint speed due to the posture and to the force", "rad/s", high=1e3, live=True
     )
-    spring_rest: tuple[float, ...] = tunable("joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0)
+    force_filter: float = parameter("time constant of the low pass on the measured force", "s", high=10.0, live=True)
+    spring_stiffness: tuple[float, ...] = parameter(
+        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", live=True
+    )
+    spring_rest: tuple[float, ...] = parameter(
+        "joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0, live=True
+    )
     contact_source: str = parameter(
         "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
         "enough. The torque of a force command in a cover's frame pins the position in both cases",
@@ -146,14 +170,15 @@ class ForceLoopParameters:
         live=True,
     )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
-    contact_position: float = tunable("assumed contact position along that cover", "m", high=3.0)
-    contact_position_sd: float = tunable(
+    contact_position: float = parameter("assumed contact position along that cover", "m", high=3.0, live=True)
+    contact_position_sd: float = parameter(
         "standard deviation of a pinned contact position",
         "m",
         high=1.0,
+        live=True,
     )
-    link_probability_limit: float = tunable(
-        "least probability of the estimated link with which its contact position is used", high=1.0
+    link_probability_limit: float = parameter(
+        "least probability of the estimated link with which its contact position is used", high=1.0, live=True
     )
 
     @property

@@ -22,7 +22,7 @@ from wam_control.force.friction_verdict import Domain, PredictedCycle, stiction_
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
 from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.parameters import lengths, parameter, tunable
+from wam_description.parameters import lengths, parameter
 from wam_theory.linear_loop import series_stiffness
 from wam_theory.stick_slip import FrictionNode
 
@@ -41,15 +41,17 @@ class GuardParameters:
         choices=("off", "warn", "refuse", "limit"),
         live=True,
     )
-    contact_stiffness: float = tunable("stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0)
-    posture: tuple[float, ...] = tunable(
-        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0
+    contact_stiffness: float = parameter(
+        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, live=True
     )
-    stability_fraction: float = tunable(
-        "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0
+    posture: tuple[float, ...] = parameter(
+        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0, live=True
     )
-    feedback_lag: float = tunable(
-        "time constant of the estimated force, with feedback contact_estimate", "s", high=10.0
+    stability_fraction: float = parameter(
+        "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0, live=True
+    )
+    feedback_lag: float = parameter(
+        "time constant of the estimated force, with feedback contact_estimate", "s", high=10.0, live=True
     )
     extra_delay: int = parameter(
         "inner periods by which a command may be later than timing.outer_delay, as in realtime",
@@ -57,11 +59,12 @@ class GuardParameters:
         high=100,
         live=True,
     )
-    interval: float = tunable(
+    interval: float = parameter(
         "shortest time between two assessments while pose, force direction or contact position change",
         "s",
         low=0.01,
         high=3600.0,
+        live=True,
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Timing
-from wam_description.parameters import parameter, require, tunable
+from wam_description.parameters import parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
@@ -22,9 +22,10 @@ from wam_description.transmission_map import TransmissionMap
 class DitherParameters:
     """Size and shape of the dither; its period is `timing.dither_cycle`."""
 
-    level: float = tunable(
+    level: float = parameter(
         "torque amplitude of the dither over the static friction of motor and joints, reflected to the motor; 0: off",
         high=3.0,
+        live=True,
     )
     phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
 

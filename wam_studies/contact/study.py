@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_description.configuration import Configuration
+from wam_description.parameters import parameter
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
 from wam_studies.contact.drives import TIMES, Drive, record, replay
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore
@@ -24,7 +25,7 @@ from wam_studies.contact.rows import (
 from wam_studies.contact.scenarios import GROUPS, KINDS, RANGES, BenchmarkScenario, ScenarioGenerator
 from wam_studies.contact.simulation import play, score
 from wam_studies.figures.panels import Panel, Panels, line_only, measured
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.scores import Scores, ScoreTable
 
 ALL = "all"
@@ -58,12 +59,12 @@ class ContactStudy(Study[ContactCase, ContactScore]):
     title = "contact estimation on an arm like its model, or with degradations"
     page = "docs/contact.md"
 
-    contacts: int = option(200, "contacts in motion per seed", 1)
-    resting: int = option(30, "contacts at rest, with dither, per seed", 0)
-    free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
-    joint_sensors: bool = option(False, "estimate from the joint sensors")
-    degradations: tuple[str, ...] = option((), "degradations of arm and signals", choices=(ALL, *NAMES))
-    seconds: float = option(110.0, "length of a recording with degradations, s", TIMES.shortest)
+    contacts: int = parameter("contacts in motion per seed", low=1, default=200)
+    resting: int = parameter("contacts at rest, with dither, per seed", default=30)
+    free: float = parameter("motion without contact per seed", "s", default=200.0)
+    joint_sensors: bool = parameter("estimate from the joint sensors", default=False)
+    degradations: tuple[str, ...] = parameter("degradations of arm and signals", choices=(ALL, *NAMES), default=())
+    seconds: float = parameter("length of a recording with degradations", "s", low=TIMES.shortest, default=110.0)
 
     def cases(self, seed: int) -> list[ContactCase]:
         """The scenarios of a seed, then its drives."""

@@ -16,10 +16,11 @@ import yaml
 from wam_bag.bag import read
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
+from wam_description.parameters import parameter
 from wam_ros.bring_up import Composition
 from wam_studies.contact.moves import MoveGenerator
 from wam_studies.faults.trials import FAULTS
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.scores import ANY, NONE_AT_ALL, Row, Scores, exact
 
 PUSH: Final = {"newtons": [0.0, 8.0, 0.0], "begin": 0.5, "end": 1.0}
@@ -84,7 +85,7 @@ class SoakStudy(Study[SoakCase, SoakRecord]):
     seeds = (1,)
     over_topics = True
 
-    seconds: float = option(600.0, "duration in the arm's time, s", 2.0)
+    seconds: float = parameter("duration in the arm's time", "s", low=2.0, default=600.0)
 
     run = staticmethod(soak)
 

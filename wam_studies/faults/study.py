@@ -5,9 +5,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
+from wam_description.parameters import parameter
 from wam_studies.faults import losses, messages, parameter_sets
 from wam_studies.faults.trials import FaultCase, FaultTrial
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, grouped, named
 
 LOCKSTEP: Final = {"timing.mode": "lockstep"}
@@ -57,8 +58,8 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
     seeds = (1,)
     over_topics = True
 
-    kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
-    trials: int = option(0, "trials of each kind; 0: as many as in docs/safety.md", 0)
+    kinds: tuple[str, ...] = parameter("kinds of faults", choices=tuple(KINDS), default=tuple(KINDS))
+    trials: int = parameter("trials of each kind; 0: as many as in docs/safety.md", default=0)
 
     run = staticmethod(run_fault)
 

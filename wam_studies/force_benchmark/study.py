@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_description.parameters import parameter
 from wam_studies.figures.panels import FEW, Panel, Panels, measured
 from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd, TaskResult
 from wam_studies.force_benchmark.tasks import POSES, RANGES, Task, draw, task_values
 from wam_studies.force_benchmark.trial import FORCE_LOOP, ForceTaskCase, ForceTrial, play
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.scores import ANY, NONE_AT_ALL, Row, Scores, ScoreTable, by_group, exact, percent, share
 
 SENSORS, MOTORS = "joint sensors", "motors with dither"
@@ -105,8 +106,8 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     seeds = (1,)
     count = 100
 
-    seconds: float = option(RANGES.seconds, "time at the full force in each task, s", 1.0)
-    compare: bool = option(False, "also run each task with other controllers; takes four times as long")
+    seconds: float = parameter("time at the full force in each task", "s", low=1.0, default=RANGES.seconds)
+    compare: bool = parameter("also run each task with other controllers; takes four times as long", default=False)
 
     def cases(self, seed: int) -> Iterator[ForceTaskCase]:
         """Tasks without end."""

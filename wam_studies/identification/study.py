@@ -15,10 +15,11 @@ from wam_analysis.identification.parameters import DIRECTIONS
 from wam_analysis.identification.regressor import Regressor
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
+from wam_description.parameters import parameter
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
-from wam_studies.harness import Study, option
+from wam_studies.harness import Study
 from wam_studies.identification.excitation import moves, path
 from wam_studies.identification.plants import EXACT, KINDS, MeasuredSignals, measured_signals, plant, true_friction
 from wam_studies.scores import Interval, Row, Scores, by_group, exact, grouped, named, percent, share
@@ -185,7 +186,7 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
     title = "identified and true friction of many plants"
     page = "docs/identify.md"
 
-    seconds: float = option(60.0, "length of each motion, s", 20.0)
+    seconds: float = parameter("length of each motion", "s", low=20.0, default=60.0)
 
     def cases(self, seed: int) -> list[IdentificationTrial]:
         """Each kind of plant."""
