@@ -53,7 +53,7 @@ COMPILED = (
     "wam_description/synchroniser.py",
     "wam_description/transmission_map.py",
     "wam_driver/amplifier.py",
-    "wam_driver/bus/parameters.py",
+    "wam_driver/bus/bus_parameters.py",
     "wam_driver/circuits.py",
     "wam_driver/driver.py",
     "wam_driver/dry_friction.py",

@@ -13,9 +13,9 @@ from wam_cli.commands.conform import driver_alone, on_bus
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
+from wam_driver.bus.bus_parameters import BusParameters
 from wam_driver.bus.frames import SAFETY, BusGroup, Frame
 from wam_driver.bus.line import CanLine
-from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.bus.simulator import SimulatedBus
 from wam_ros.bring_up import NodeProcess

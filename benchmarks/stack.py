@@ -40,8 +40,8 @@ from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.messages import joint_state
+from wam_ros.ros_topics import qos, stamp_of
 from wam_ros.run import Connection
-from wam_ros.topics import qos, stamp_of
 from wam_ros.wire import stamp_of as stamp_in
 from wam_sim.simulation import Simulation
 

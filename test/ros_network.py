@@ -8,8 +8,8 @@ from typing import Any
 from conftest import LONG
 from rclpy.node import Node
 
+from wam_ros.ros_topics import NAMESPACE
 from wam_ros.run import Connection
-from wam_ros.topics import NAMESPACE
 
 
 class Network(Connection):

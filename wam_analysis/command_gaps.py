@@ -8,7 +8,7 @@ import numpy as np
 from wam_analysis.held_messages import held_for, rows_before_gaps
 from wam_bag.arrays import Mask, Times
 from wam_bag.bag import TableColumns, WrenchColumns
-from wam_sim.recording import RecordedRun, RecordedStep
+from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 COMMANDS = ("force_command", "task_command", "sim/disturbance")
 

@@ -10,7 +10,7 @@ from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import JointColumns
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 
 
 def held_for(stamps: Times) -> int:

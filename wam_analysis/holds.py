@@ -10,7 +10,7 @@ from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import HOLD
 from wam_analysis.traces import Traces
 from wam_sim.reactions import RecordedReaction, of_force_loop, within
-from wam_sim.recording import RecordedRun, RecordedStep
+from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 
 def holds_of(

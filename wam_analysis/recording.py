@@ -22,7 +22,7 @@ from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.status import ENABLED, diagnosed_name
 from wam_sim.reactions import SETTLING_TIME, RecordedReaction, too_short, unassessed, watched_times
-from wam_sim.recording import RecordedStep, messages_of, recorded_run, status_of
+from wam_sim.recorded_run import RecordedStep, messages_of, recorded_run, status_of
 
 STAMPED = (JointColumns, WrenchColumns, PointColumns)
 MOVING = ("motor_states", "joint_sensors", "joint_states", "sim/joint_states")  # where motion is seen, the best first

@@ -13,7 +13,7 @@ from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import Table
 from wam_sim.reactions import BRIEF, STEADY, RecordedReaction
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 from wam_sim.replay import tables
 
 RecordedTask = tuple[TaskCommand, int, int]  # with begin and end, ns

@@ -14,7 +14,7 @@ from wam_description.event import Code
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_sim.reactions import RecordedReaction
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 
 _Points = tuple[Times, Numbers]  # stamps, ns, and positions along a link, m, (k,)
 

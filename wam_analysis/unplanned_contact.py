@@ -13,7 +13,7 @@ from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import BagError
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import FORCE_LOOP
-from wam_sim.recording import RecordedRun, RecordedStep
+from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 LIMIT = "limits.contact_force"
 

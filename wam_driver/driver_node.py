@@ -17,7 +17,7 @@ from wam_driver.realtime import Realtime
 from wam_driver.thresholds import DRIVER
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.parameters import follow_together
+from wam_ros.ros_parameters import follow_together
 
 
 class DriverNode(ArmDriver):

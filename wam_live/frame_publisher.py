@@ -13,7 +13,7 @@ from wam_description.frames import ArmFrames, FramePlacement
 from wam_description.topics import BY_NAME
 from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused
-from wam_ros.topics import NAMESPACE, header, qos
+from wam_ros.ros_topics import NAMESPACE, header, qos
 from wam_ros.wire import decoder, stamp_of
 
 

@@ -10,7 +10,7 @@ from wam_description.signals import Wrench
 from wam_description.topics import BY_NAME
 from wam_live.thresholds import LIVE
 from wam_ros.messages import message_type
-from wam_ros.topics import qos
+from wam_ros.ros_topics import qos
 from wam_ros.wire import encoder
 
 KEYS: Final = {"sim/disturbance": "push", "force_command": "force"}  # of a step of a scenario

@@ -25,8 +25,8 @@ from wam_live.thresholds import LIVE
 from wam_ros.client import StackClient
 from wam_ros.messages import message_type
 from wam_ros.requests import answer_of
+from wam_ros.ros_topics import qos
 from wam_ros.run import Connection
-from wam_ros.topics import qos
 from wam_ros.wire import stamp_of
 
 

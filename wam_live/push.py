@@ -9,7 +9,7 @@ from wam_description.status import PAUSED
 from wam_live.hold import HeldTopic
 from wam_ros.client import StackClient
 from wam_ros.limits import CALL_LIMITS
-from wam_ros.topics import stamp_of
+from wam_ros.ros_topics import stamp_of
 
 NO_PUSH = Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 

@@ -25,7 +25,7 @@ from wam_description.topics import BY_NAME, STATUS
 from wam_live.thresholds import LIVE
 from wam_ros.client import run_next_to
 from wam_ros.messages import Refused, message_type, read_status, read_trajectory
-from wam_ros.topics import qos
+from wam_ros.ros_topics import qos
 
 ACTION: Final = "follow_joint_trajectory"
 TOPIC: Final = "joint_trajectory"

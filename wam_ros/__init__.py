@@ -5,10 +5,10 @@
 - inlets: its subscriptions, from one publisher each; outlets: its publishers, and copies of them for a viewer
 - health: its status, problems, refusals and diagnostics
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
-- topics: a topic of the table on ROS: name, quality of service, header
+- ros_topics: a topic of the table on ROS: name, quality of service, header
 - wire: the codec between bytes and values; messages: message objects to values and back; markers: what viewers draw
 - local_bus: messages between nodes of one process, without the middleware
-- parameters: declared, described, live; remote_parameters: those of other nodes
+- ros_parameters: declared, described, live; remote_parameters: those of other nodes
 - requests: requests to services and their answers; client: a running stack as a program next to it sees it
 - recorder, recorder_node, recorder_interface: every topic into a bag; recorded_stack: whether that is one run
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process

@@ -21,8 +21,8 @@ from wam_ros.network import require_places
 from wam_ros.node import make_node, parameter_file
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
+from wam_ros.ros_topics import NAMESPACE
 from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory
-from wam_ros.topics import NAMESPACE
 
 LOGGER: Final = get_logger("wam")
 # codes of a recorder that SIGTERM ended before it had a bag

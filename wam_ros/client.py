@@ -23,9 +23,9 @@ from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import Refused, message_type
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import Request, answer_of, service_request
+from wam_ros.ros_topics import NAMESPACE, listening, qos
 from wam_ros.run import Closing, Connection
 from wam_ros.tolerance import LeavingNode
-from wam_ros.topics import NAMESPACE, listening, qos
 from wam_ros.wire import decoder, encoder, stamp_of, status_of
 
 MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has

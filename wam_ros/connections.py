@@ -16,10 +16,10 @@ from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.network import Place, require_name
 from wam_ros.outlets import Outlets
-from wam_ros.parameters import declare
 from wam_ros.priority import OWN, PRIORITY
+from wam_ros.ros_parameters import declare
+from wam_ros.ros_topics import DIAGNOSTICS
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import DIAGNOSTICS
 from wam_ros.wire import status_of
 
 

@@ -24,7 +24,7 @@ from wam_ros.client import StackClient
 from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import diagnostic_status, joint_state, message_type
-from wam_ros.topics import DIAGNOSTICS, NAMESPACE, qos, topic_name
+from wam_ros.ros_topics import DIAGNOSTICS, NAMESPACE, qos, topic_name
 from wam_ros.wire import stamp_of
 
 KEPT = ("motor_states", "motor_currents", "/clock")

@@ -20,7 +20,7 @@ from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS, LongStep
 from wam_ros.messages import diagnostic_status
 from wam_ros.outlets import Outlets
-from wam_ros.topics import DIAGNOSTICS, SECOND, header
+from wam_ros.ros_topics import DIAGNOSTICS, SECOND, header
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")

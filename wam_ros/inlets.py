@@ -13,8 +13,8 @@ from wam_ros.health import Health
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.local_bus import LocalBus
 from wam_ros.messages import Refused, message_type
+from wam_ros.ros_topics import listening, topic_name
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import listening, topic_name
 from wam_ros.wire import decoder, stamp_of
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet

@@ -7,7 +7,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from wam_description.signals import BASE, ContactView
-from wam_ros.topics import header
+from wam_ros.ros_topics import header
 
 METRES_PER_NEWTON = 0.02
 HALF = 0.5**0.5  # sine and cosine of 45 deg

@@ -17,7 +17,7 @@ from wam_description.signals import NodeStatus, PathPoint, Point, PosturePath, S
 from wam_description.status import pairs, parse
 from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TABLE, TASK_COLUMNS, TRAJECTORY, WRENCH, Topic
 from wam_ros.limits import NODE_LIMITS
-from wam_ros.topics import header, stamp_of
+from wam_ros.ros_topics import header, stamp_of
 
 Read = Callable[[Any], Any]
 

@@ -32,10 +32,10 @@ from wam_ros.connections import StackNode
 from wam_ros.health import problem_of
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.parameters import Follower, follow_together
 from wam_ros.requests import Request, RequestQueue
+from wam_ros.ros_parameters import Follower, follow_together
+from wam_ros.ros_topics import SECOND
 from wam_ros.run import run
-from wam_ros.topics import SECOND
 
 
 class AdaptedNode(StackNode):

@@ -17,8 +17,8 @@ from wam_description.arm import Shared
 from wam_description.topics import Topic
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
+from wam_ros.ros_topics import qos, topic_name
 from wam_ros.run import end_of_delivery
-from wam_ros.topics import qos, topic_name
 from wam_ros.wire import encoder
 
 PERIOD: Final = 1.0 / 30.0  # s of the wall clock, between copies

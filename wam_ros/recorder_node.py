@@ -19,12 +19,12 @@ from wam_ros.health import ENDED, NODE, PUBLISHED, READY
 from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
-from wam_ros.parameters import declare
 from wam_ros.recorded_stack import RecordedStack
 from wam_ros.recorder import Recorder
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
+from wam_ros.ros_parameters import declare
+from wam_ros.ros_topics import DIAGNOSTICS, listening, qos, topic_name
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import DIAGNOSTICS, listening, qos, topic_name
 from wam_ros.wire import deserialized
 
 

@@ -28,7 +28,7 @@ from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
 from wam_ros.processors import keep_to_processors
-from wam_ros.topics import NAMESPACE
+from wam_ros.ros_topics import NAMESPACE
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST = "recorder"  # to be stopped: it closes the bag

@@ -30,7 +30,7 @@ from wam_ros.limits import TEST_LIMITS
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
 from wam_ros.network import Place, is_inhabited
-from wam_ros.topics import NAMESPACE, SECOND, listening, topic_name
+from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
 from wam_ros.wire import decoder, stamp_of
 
 _EMPTY: Final[Mapping[str, Any]] = {

@@ -3,7 +3,7 @@
 - simulation: the nodes of a configuration around the simulated arm, in lockstep
 - bus: topics of a simulation or a replay, and what was published on them
 - simulated_bag: a simulation recorded as the recorder node records the nodes
-- recording, recorded_parameters: a recorded run, its steps, faults and parameters, read from a bag
+- recorded_run, recorded_parameters: a recorded run, its steps, faults and parameters, read from a bag
 - recorded_commands: the commands of a bag as the stack took them; whether a bag has several runs
 - reactions: what the force loop did instead of what was commanded, and whether a step was carried out
 - replay: recorded inputs through a node again, its outputs compared with the recorded ones

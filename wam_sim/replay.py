@@ -29,7 +29,7 @@ from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs
 from wam_sim.bus import Bus, TopicValue, flat
-from wam_sim.recording import RecordedRun, recorded_run
+from wam_sim.recorded_run import RecordedRun, recorded_run
 
 # fields of messages with three axes, and their units
 _FIELDS = {WRENCH: (("force.", "N"), ("torque.", "N m")), POINT: (("", "m"),)}

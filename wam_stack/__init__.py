@@ -30,7 +30,7 @@ from wam_control.force.guard import Report
 from wam_control.task.scenario import ScenarioStep, load_for
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 from wam_sim.simulation import Simulation
 
 __all__ = ["IdentifiedModel", "analyse", "arm", "guard", "identify", "load", "read", "simulate"]

@@ -16,9 +16,9 @@ from wam_analysis.identification.contradictions import Mistake, contradictions
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import evenly, motion, recorded_motion
 from wam_analysis.identification.overlay import estimator_values, model_values, write_overlay
-from wam_analysis.identification.parameters import DIRECTIONS as WAYS
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.report import report
+from wam_analysis.identification.unknowns import DIRECTIONS as WAYS
 from wam_bag.bag import BagError, read
 from wam_cli.main import main
 from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
@@ -31,7 +31,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 from wam_studies.identification.study import IdentificationTrial, run_trial
 
 ROOT = Path(__file__).parents[2]

@@ -41,7 +41,7 @@ from wam_description.signals import Contact
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
 from wam_sim.reactions import RecordedReaction, sentences
 from wam_sim.recorded_parameters import recorded_parameters
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 from wam_sim.simulated_bag import record
 from wam_studies.thesis.definition import load
 

@@ -10,7 +10,7 @@ from wam_description.event_text import sentence
 from wam_description.signals import BASE, NodeStatus
 from wam_description.status import pairs, parse, with_refused
 from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
-from wam_sim.recording import RecordedStep
+from wam_sim.recorded_run import RecordedStep
 
 SECOND = 1_000_000_000
 

@@ -23,7 +23,7 @@ from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.bus.start_up import Wait
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.plant import Plant
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 

@@ -8,9 +8,9 @@ import pytest
 
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames
+from wam_driver.bus.bus_parameters import BusParameters
 from wam_driver.bus.dry_run import heard, sent
 from wam_driver.bus.line import line_of
-from wam_driver.bus.parameters import BusParameters
 
 BUS4 = Configuration.load(packaged("barrett-wam4-bus"))
 

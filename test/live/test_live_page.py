@@ -70,7 +70,7 @@ from wam_live.snapshot import Snapshot  # noqa: E402
 from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.messages import message_type  # noqa: E402
 from wam_ros.outlets import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
-from wam_ros.topics import qos  # noqa: E402
+from wam_ros.ros_topics import qos  # noqa: E402
 from wam_ros.wire import encoder  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))

@@ -17,7 +17,7 @@ from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
 from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status
-from wam_ros.topics import qos
+from wam_ros.ros_topics import qos
 
 OWN = digests(WAM.shared)
 SERVO = WAM.shared.servo

@@ -15,7 +15,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import ZERO, State, Wrench
 from wam_description.topics import BY_NAME
 from wam_ros.messages import joint_state, message_type
-from wam_ros.topics import qos, stamp_of
+from wam_ros.ros_topics import qos, stamp_of
 from wam_ros.wire import encoder
 
 MS = 1_000_000

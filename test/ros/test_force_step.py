@@ -17,7 +17,7 @@ from wam_description.event import Level
 from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME
 from wam_ros.messages import diagnostic_status
-from wam_ros.topics import qos
+from wam_ros.ros_topics import qos
 
 
 def answered(request: Any, response: Any) -> Any:

@@ -21,7 +21,7 @@ from wam_description.wiring import Input, Outputs, reaction
 from wam_driver.safety import Mode
 from wam_ros.long_steps import LongStep, Steps
 from wam_ros.messages import diagnostic_status, joint_state, message_type
-from wam_ros.topics import qos, stamp_of
+from wam_ros.ros_topics import qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 
 LIMIT = 50 * MS  # ns of the arm's time, from the last answer of a node to zero current

@@ -28,8 +28,8 @@ from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.node import make_node
 from wam_ros.outlets import COPIED, copy_name
+from wam_ros.ros_topics import qos, stamp_of
 from wam_ros.testing import RunningArm, playing
-from wam_ros.topics import qos, stamp_of
 from wam_ros.wire import encoder
 from wam_studies.faults.answered_clock import AnsweredClock
 

@@ -28,8 +28,8 @@ from wam_ros import bring_up
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.limits import CALL_LIMITS, PROCESS_LIMITS
 from wam_ros.process_signals import LISTENER_GONE
+from wam_ros.ros_topics import qos
 from wam_ros.run import prepare_logging_directory, run
-from wam_ros.topics import qos
 
 ROOT = Path(__file__).parents[2]
 NODES = 7  # six and the recorder

@@ -42,8 +42,8 @@ from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
+from wam_ros.ros_topics import header, qos
 from wam_ros.testing import RunningArm
-from wam_ros.topics import header, qos
 
 CONFIG = Path(__file__).parents[2] / "config" / "wam.yaml"
 ROOT = Path(__file__).parents[2]

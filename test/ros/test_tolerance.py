@@ -23,8 +23,8 @@ from wam_driver.safety import Mode
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.messages import Refused, diagnostic_status
 from wam_ros.node import make_node
+from wam_ros.ros_topics import header, qos
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import header, qos
 
 WAM = Configuration.load(packaged("wam"))
 SEED = 20261120

@@ -21,8 +21,8 @@ from wam_description.event import Level
 from wam_description.signals import NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_ros.messages import Refused, diagnostic_status, joint_state, message_type, read_status, reader
-from wam_ros.topics import header
-from wam_ros.topics import stamp_of as stamp_of_message
+from wam_ros.ros_topics import header
+from wam_ros.ros_topics import stamp_of as stamp_of_message
 from wam_ros.wire import decoder, encoder, stamp_of, status_of
 
 SHARED = Configuration.load(packaged("wam")).shared

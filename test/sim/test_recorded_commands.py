@@ -12,7 +12,7 @@ from wam_analysis.findings.analysis import Analysis, analyse_bag
 from wam_bag.bag import Bag, BagError, TableColumns
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_sim.recorded_commands import COMMANDS
-from wam_sim.recording import RecordedRun, recorded_run
+from wam_sim.recorded_run import RecordedRun, recorded_run
 
 SECONDS = 4.0
 STATES = np.arange(0.001, SECONDS, 0.001)

@@ -18,9 +18,9 @@ from wam_cli.commands.replay import other_values
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
+from wam_ros.ros_topics import stamp_of
 from wam_ros.testing import RunningArm, playing
-from wam_ros.topics import stamp_of
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 from wam_sim.replay import REPLAYED, replay
 
 STEPS = {

@@ -11,7 +11,7 @@ from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_control.task.scenario_settings import Setting
 from wam_description.configuration import Configuration, packaged
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 from wam_sim.simulated_bag import record
 
 ROOT = Path(__file__).parents[2]

@@ -27,7 +27,7 @@ from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
 from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 
 OF_THE_START = "predicted for the parameters at the start; they were changed later"
 Progress = Callable[[str], None]

@@ -23,7 +23,7 @@ from wam_bag.arrays import Mask, Numbers
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 from wam_theory.verdicts import Verdict
 
 UNMEASURED = force_accuracy(math.nan, np.empty(0))

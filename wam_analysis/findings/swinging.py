@@ -12,7 +12,7 @@ from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 from wam_theory.verdicts import Verdict
 
 

@@ -15,7 +15,7 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 
 
 class TransmissionFindings(NamedTuple):

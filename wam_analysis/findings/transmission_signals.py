@@ -11,7 +11,7 @@ from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 
 CABLE = "cable torque of the simulator"
 STRAIN = "strain gauges"

@@ -1,7 +1,7 @@
 """From a recording of free motion to the model of the controllers: friction and inertial parameters, with covariance.
 
 motion      recorded motor states, checked, filtered and thinned
-parameters  what is estimated: names, present values, prior standard deviations
+unknowns    what is estimated: names, present values, prior standard deviations
 regressor   motor torques per parameter
 fit         estimate, covariance by jackknife, cross-validation
 tracked_errors  covariance of parameters, and in the errors of the model that the contact estimator tracks

@@ -13,8 +13,8 @@ import numpy as np
 
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import DIRECTIONS, Unknowns
 from wam_analysis.identification.regressor import Regressor
+from wam_analysis.identification.unknowns import DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared

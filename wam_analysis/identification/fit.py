@@ -12,10 +12,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, unknowns, with_kept_weight
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
 from wam_analysis.identification.tracked_errors import TrackedErrors, Uncertainty, tracked_errors
+from wam_analysis.identification.unknowns import DIRECTIONS, Unknowns, unknowns, with_kept_weight
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers, Rows
 from wam_description.arm import Shared

@@ -15,7 +15,7 @@ from wam_analysis.thresholds import IDENTIFY, STREAM
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import BagError
 from wam_description.arm import Arm
-from wam_sim.recording import RecordedRun
+from wam_sim.recorded_run import RecordedRun
 
 LOADS = {
     "sim/disturbance": "the simulator pushed the arm",

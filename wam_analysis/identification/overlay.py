@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 
 from wam_analysis.identification.fit import Identification
-from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
+from wam_analysis.identification.unknowns import AXES, DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY, LAYOUT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Shared

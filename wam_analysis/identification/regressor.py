@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
+from wam_analysis.identification.unknowns import AXES, DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared

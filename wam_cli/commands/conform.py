@@ -10,9 +10,9 @@ from multiprocessing import get_context
 from wam_cli.options import COUNT, bounded, configuration_of, take_configuration, take_stack
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
+from wam_driver.bus.bus_parameters import BusParameters
 from wam_driver.bus.dry_run import heard, sent
 from wam_driver.bus.line import answer, line_of
-from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
 from wam_ros.bring_up import NodeProcess

@@ -218,7 +218,7 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
     from wam_cli.commands.live import page_next_to
     from wam_cli.commands.up import import_nodes
     from wam_ros.bring_up import start
-    from wam_ros.topics import NAMESPACE
+    from wam_ros.ros_topics import NAMESPACE
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
     import_nodes(configuration, given)

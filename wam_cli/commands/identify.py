@@ -35,7 +35,7 @@ from wam_description.configuration import Configuration, files_of
 from wam_description.parameters import ParameterError
 from wam_ros.process_signals import Stop
 from wam_sim.progress import Progress
-from wam_sim.recording import RecordedRun, recorded_run
+from wam_sim.recorded_run import RecordedRun, recorded_run
 from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 

@@ -9,7 +9,7 @@
 - start_up: finds, wakes, checks and zeroes the controllers
 - motor, cycle: what is sent and taken in each period
 - arm_bus: the driver, one call per period
-- parameters, interface, bus_driver_node: the node, also for a bus of your own
+- bus_parameters, interface, bus_driver_node: the node, also for a bus of your own
 - dry_run: what is on the bus, and what would be sent
 - simulator: controllers, safety module and a person, in bus time
 """

@@ -12,8 +12,8 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import Answer, State
 from wam_driver.arm_driver_node import ArmDriver
 from wam_driver.bus.arm_bus import ArmBus
+from wam_driver.bus.bus_parameters import SIMULATED
 from wam_driver.bus.line import line_of
-from wam_driver.bus.parameters import SIMULATED
 from wam_driver.safety import Mode, Safety
 from wam_driver.thresholds import DRIVER
 

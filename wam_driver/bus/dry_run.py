@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from wam_description.arm import Shared
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
+from wam_driver.bus.bus_parameters import BusParameters
 from wam_driver.bus.frames import HOST, SAFETY, BusGroup, Frame
 from wam_driver.bus.line import Line, incoming
-from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS

@@ -6,8 +6,8 @@ from typing import Any
 
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError, require
+from wam_driver.bus.bus_parameters import SIMULATED, BusParameters
 from wam_driver.bus.frames import HOST, Frame
-from wam_driver.bus.parameters import SIMULATED, BusParameters
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
 

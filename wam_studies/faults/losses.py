@@ -11,7 +11,7 @@ from wam_description.signals import BASE, ZERO, State, Wrench
 from wam_description.wiring import Call
 from wam_ros.bring_up import NodeProcess
 from wam_ros.client import StackClient
-from wam_ros.topics import NAMESPACE
+from wam_ros.ros_topics import NAMESPACE
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 
 ANSWERS: Final = {  # a topic that each node publishes in every outer period or more often

@@ -21,7 +21,7 @@ from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.messages import message_type
-from wam_ros.topics import NAMESPACE, SECOND, listening, qos
+from wam_ros.ros_topics import NAMESPACE, SECOND, listening, qos
 from wam_ros.wire import stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves

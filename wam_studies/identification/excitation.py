@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import unknowns
 from wam_analysis.identification.regressor import Regressor
+from wam_analysis.identification.unknowns import unknowns
 from wam_control.task.motion import FASTEST
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Shared

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.identification.parameters import shared_joints
+from wam_analysis.identification.unknowns import shared_joints
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm

@@ -11,8 +11,8 @@ import numpy as np
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import MotionSamples, evenly, motion
 from wam_analysis.identification.overlay import model_values
-from wam_analysis.identification.parameters import DIRECTIONS
 from wam_analysis.identification.regressor import Regressor
+from wam_analysis.identification.unknowns import DIRECTIONS
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.parameters import parameter

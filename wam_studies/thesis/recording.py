@@ -13,7 +13,7 @@ from wam_description.arm import Shared
 from wam_description.signals import ObjectState
 from wam_description.world import World
 from wam_sim.recorded_parameters import RecordedParameters
-from wam_sim.recording import recorded_run
+from wam_sim.recorded_run import recorded_run
 
 OBJECTS = "sim/objects"
 T = TypeVar("T")
