@@ -78,5 +78,5 @@ def with_section(file: Path, name: str, text: str, title: str = "") -> str:
     before, _, rest = page.partition(begin)
     _, is_whole, after = rest.partition(END)
     if not is_whole:
-        raise ValueError(f"{file} has no line '{begin.strip()}'; remove the file, or write into another one")
+        raise ValueError(f"{file} has no line '{begin.strip()}' before '{END}'; add both where the result belongs")
     return f"{before}{begin}{text.rstrip()}\n{END}{after}"

@@ -15,7 +15,7 @@ NONE_AT_ALL: Final[Bound] = (0.0, 0.0)  # a count that must be zero
 Z: Final = 1.96  # of a two-sided 95 % interval
 RESAMPLED: Final = 400  # bootstrap samples
 FEW: Final = "too few"
-FEWEST: Final = 20  # observations, below which a verdict is not one on the quantity
+FEWEST: Final = 20  # observations, below which a verdict on an estimate, or on what never happens, is not certain
 MET, TARGET_MET, MARGINAL, MISSED = "met", "**target met**", "met, marginal", "**MISSED**"
 MISSED_MARGINAL, TARGET_MISSED = "**MISSED**, marginal", "target missed"
 
@@ -146,9 +146,15 @@ class Row(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """The mark, with a remark where it is one on too few observations."""
-        mark, observed = self.mark, self.found.observed
-        return f"{mark} (n={observed}: {FEW})" if mark and observed < FEWEST and FEW not in mark else mark
+        """The mark; with a remark on few observations, unless the value is that of the cases themselves.
+
+        A largest error is that of its cases, however few they are; an estimate, and that something never happens, need
+        more.
+        """
+        mark, found = self.mark, self.found
+        needs_more = found.low != found.high or self.required == NONE_AT_ALL
+        is_few = mark and needs_more and found.observed < FEWEST and FEW not in mark
+        return f"{mark} (n={found.observed}: {FEW})" if is_few else mark
 
     @property
     def cells(self) -> list[str]:

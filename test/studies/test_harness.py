@@ -106,7 +106,7 @@ def test_a_missed_value_and_each_failed_case_with_its_command_are_printed() -> N
     found = measured(count=4)
     assert found.scores.missed == ["largest: 9 m, required 5"]
     text = report(found, "wam evaluate square")
-    assert "| largest | m | 5 |  | 9 | 9 | 9 |  | 8 | **MISSED** (n=8: too few) |" in text
+    assert "| largest | m | 5 |  | 9 | 9 | 9 |  | 8 | **MISSED** |" in text
     assert "* seed 2, case 3: 9\n  `wam evaluate square --seeds 2 --only 3`" in text
     assert "## Numbers" in text
 
@@ -131,7 +131,7 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_study_names_a_page_that_has_its_section(name: str) -> None:
     kind = load(name)
-    assert kind.title
+    assert kind.page.startswith("docs/"), f"give {kind.__name__} the page of its result: page = 'docs/PAGE.md'"
     assert section_of(ROOT / kind.page, name), f"missing: wam evaluate {name} --write {kind.page} makes it"
 
 
@@ -160,6 +160,15 @@ def test_a_mark_compares_value_and_interval_with_what_is_allowed(
     required: Bound, target: Bound, found: Interval, mark: str
 ) -> None:
     assert Row("x", found, required=required, target=target, enough=(120.0, 600.0)).mark == mark
+
+
+@pytest.mark.parametrize(
+    ("found", "bound", "few"),
+    [(exact(1.0, 3), TO_TWO, ""), (share(3, 3), TO_TWO, " (n=3: too few)"), (share(30, 30), TO_TWO, "")],
+)
+def test_a_greatest_value_of_three_cases_is_certain_and_a_share_is_not(found: Interval, bound: Bound, few: str) -> None:
+    assert Row("x", found, required=bound).verdict == f"{MET}{few}"
+    assert Row("x", exact(0.0, 3), required=NONE_AT_ALL).verdict == f"{MET} (n=3: too few)"
 
 
 @pytest.fixture
