@@ -28,15 +28,6 @@ class Press(NamedTuple):
     seconds: float
 
 
-def press(case: Press) -> float:
-    """The error of the force at the end; a function of its case alone, so that any process can run it."""
-    command = ForceCommand("link", (0.0, -case.force, 0.0))
-    steps = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("press", case.seconds, force=command)]
-    run = Simulation(case.configuration, steps)
-    run.play()
-    return -run.rows["force_measured"][-2].values[1] / case.force - 1.0
-
-
 @dataclass(frozen=True)
 class PressStudy(Study[Press, float]):
     """Three forces of 5 to 15 N that are drawn from the seed."""
@@ -44,13 +35,23 @@ class PressStudy(Study[Press, float]):
     title: ClassVar[str] = "forces on the testbed"
     base: ClassVar[str] = "testbed"
     seconds: float = parameter("duration of each force", "s", low=1.0, default=2.0)
-    run = staticmethod(press)
 
     def cases(self, seed: int) -> Iterator[Press]:
+        """The presses of a seed."""
         for force in np.random.default_rng(seed).uniform(5.0, 15.0, 3).tolist():
             yield Press(self.configuration, force, self.seconds)
 
+    @staticmethod
+    def run(case: Press) -> float:
+        """The error of the force at the end; a function of its case alone, so that any process can run it."""
+        command = ForceCommand("link", (0.0, -case.force, 0.0))
+        steps = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("press", case.seconds, force=command)]
+        run = Simulation(case.configuration, steps)
+        run.play()
+        return -run.rows["force_measured"][-2].values[1] / case.force - 1.0
+
     def score(self, records: Sequence[float]) -> Scores:
+        """The largest error, with what is required of it."""
         largest = exact(max(map(abs, records)), len(records))
         return Scores([Row("largest error", largest, "%", 100.0, required=(0.0, 0.1), target=(0.0, 0.01))])
 

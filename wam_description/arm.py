@@ -328,7 +328,7 @@ class InputAges:
     )  # fmt: skip
 
     def limit_ns(self, kind: str) -> int:
-        """One of the limits by its name, ns."""
+        """The limit of this name, such as 'command', in ns."""
         return round(getattr(self, kind) * 1e9)
 
 

@@ -45,6 +45,6 @@ class Constant:
 
 @cache
 def constants(arm: str) -> tuple[Constant, ...]:
-    """Those of an arm, 'wam' or 'testbed'."""
+    """The constants of an arm, 'wam' or 'testbed', in the order of `constants.yaml`."""
     rows = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))[arm]
     return tuple(Constant(**row) for row in rows)

@@ -36,17 +36,17 @@ class Code(StrEnum):
 
     @property
     def words(self) -> str:
-        """As a report has it."""
+        """The name of the code in words, as reports print it."""
         return self.replace("_", " ")
 
     @property
     def number(self) -> int:
-        """Its number in `force_axis`."""
+        """The number that stands for this code in the topic `force_axis`."""
         return list(Code).index(self)
 
 
 class Event(NamedTuple):
-    """What happened.
+    """Something that happened: a code, how serious it is, and the values behind it.
 
     Attributes
     ----------
@@ -62,21 +62,21 @@ class Event(NamedTuple):
 
     @property
     def cause(self) -> Value:
-        """Which of the cases of its code it is, '' where there is one alone."""
+        """Which case of its code the event is; '' where the code has one case."""
         return self.values.get(CAUSE, "")
 
     @property
     def holds(self) -> bool:
-        """Whether the force loop holds the arm because of it."""
+        """Whether the force loop holds the arm because of the event."""
         return bool(self.values.get(HOLDS, 0.0))
 
     @property
     def subject(self) -> tuple[Value, ...]:
-        """What it is about: events that differ in this are two, while one whose numbers change goes on."""
+        """What the event is about.  Events of different subjects are two; an event whose numbers change goes on."""
         return self.code, *(self.values.get(name, "") for name in SUBJECTS)
 
     def with_values(self, **values: Value) -> "Event":
-        """The same with further values."""
+        """The event with further values."""
         return self._replace(values={**self.values, **values})
 
 

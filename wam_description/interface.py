@@ -195,7 +195,7 @@ class Interface:
         return found
 
     def checks(self, declaration: Declaration) -> dict[str, Check]:
-        """What each output of a node of your own goes through, by topic: see `output_check`, if another node takes it.
+        """The checks of the outputs of a node of your own, by topic: `output_check` for each that another node takes.
 
         The nodes of the stack are not looked at: the simulation would be slower by a twentieth.
         """

@@ -10,7 +10,7 @@ def brief(value: float, digits: int = 2) -> str:
 
 
 def digits_apart(value: float, other: float) -> int:
-    """With how many digits `brief` writes two different numbers differently; at least two, at most six."""
+    """Number of digits with which `brief` writes two different numbers differently; at least two, at most six."""
     return next((digits for digits in range(2, 6) if brief(value, digits) != brief(other, digits)), 6)
 
 

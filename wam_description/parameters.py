@@ -94,12 +94,12 @@ def parameter(
     low, high : inclusive range of each number.
     choices : allowed strings.
     live : True if a running node may take a new value.
-    width : of a list, the number of values for each of what it runs over, see `aligned`.
-    is_common : of a list, whether a single value counts for all.
-    length : of a list that runs over nothing with names, the number of its values; 0 for any.
+    width : number of values of a list for each name that it runs over, which `aligned` checks.
+    is_common : whether a single value of a list counts for all.
+    length : number of values of a list that runs over no names; 0 for any.
     default : the value where a configuration gives none.  The field is then an argument by keyword, so it can be
         anywhere in its class.
-    follows : the parameter whose value it has where a configuration gives none, see `like`.
+    follows : name of the parameter whose value it has where a configuration gives none; `like` sets it.
     """
     metadata = {
         "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live, "width": width,

@@ -30,7 +30,7 @@ def inverse(matrix: Array) -> Array:
 
 
 def largest_eigenvalue(matrix: Array) -> float:
-    """Of a symmetric matrix (n, n); NaN where it is not finite."""
+    """Largest eigenvalue of a symmetric matrix (n, n); NaN where the matrix is not finite."""
     found: float = LAPACK.eigvalsh_lo(matrix).item(-1)
     return found
 
@@ -64,5 +64,5 @@ def solutions(matrices: Array, right: Array) -> Array:
 
 
 def checked_solutions(matrices: Array, right: Array) -> Array:
-    """The same of one matrix or of several, as `numpy.linalg` solves them."""
+    """Solutions x of A x = b for one matrix A or several, by `numpy.linalg`, which refuses singular ones."""
     return np.asarray(np.linalg.solve(matrices, right[..., None])[..., 0], np.float64)

@@ -77,7 +77,7 @@ class Inputs(dict[str, Any]):
         return inputs
 
     def __missing__(self, topic: str) -> None:
-        """None."""
+        """Return None for a topic that has no input in this step."""
 
     def stamp_of(self, topic: str) -> int:
         """Stamp of an input, ns; that of the trigger where there is none."""

@@ -337,7 +337,7 @@ def mode_of(statuses: Mapping[str, NodeStatus]) -> str:
 
 
 def margin_text(facts: Mapping[str, str]) -> str:
-    """By how much the gains may be larger, as the guard of the force loop reports it."""
+    """The factor by which the gains may be larger, as the guard of the force loop reports it, as HTML."""
     if "margin" not in facts:
         return ""
     here = facts.get("margin here", facts["margin"])

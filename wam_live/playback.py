@@ -33,11 +33,11 @@ class StampedTables(NamedTuple):
 
     @classmethod
     def of(cls, columns: TableColumns | None) -> "StampedTables":
-        """Those of recorded messages."""
+        """Tables and stamps of the recorded messages of a topic; empty for None."""
         return cls([], []) if columns is None else cls(columns.stamp_ns.tolist(), tables(columns))
 
     def at(self, stamp: int, held: float = math.inf) -> Table | None:
-        """The last one at or before a time, ns, if it is not older than `held`, ns."""
+        """The last table at or before a time, ns, if it is not older than `held`, ns."""
         row = bisect_right(self.stamps, stamp) - 1
         return self.tables[row] if row >= 0 and stamp - self.stamps[row] < held else None
 

@@ -97,13 +97,13 @@ class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
         yield from _testbeds(self.configuration, seed, self.testbed)
 
     def score(self, records: Sequence[ValidationRecord]) -> Scores:
-        """What is accepted and diverges, what is refused and comes to rest."""
+        """Count the accepted sets that diverge and the refused ones that come to rest."""
         verdicts = "refused", "accepted"
         groups = grouped(records, lambda one: f"{one.where}, {one.domain}, {verdicts[one.is_accepted]}")
         return Scores(list(_rows(records)), [by_group("Verdicts and responses", dict(sorted(groups.items())), _ends)])
 
     def failure(self, record: ValidationRecord) -> str:
-        """An accepted set that diverges."""
+        """A sentence about an accepted set that diverges; '' otherwise."""
         return f"{record.label}, accepted, diverges" if record.is_accepted and record.end == DIVERGES else ""
 
 

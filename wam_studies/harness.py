@@ -37,7 +37,7 @@ STUDIES: Final = {
 
 @dataclass(frozen=True)
 class Study(ABC, Generic[Case, Record]):
-    """What is drawn, what is measured of each case, and what is required of all.
+    """A study: the cases that are drawn, what is measured of each, and what is required of all.
 
     Attributes
     ----------
@@ -66,14 +66,14 @@ class Study(ABC, Generic[Case, Record]):
     @staticmethod
     @abstractmethod
     def run(case: Case, /) -> Record:
-        """Measure a case; a record is plain data, see `wam_sim.pieces`."""
+        """Measure a case.  A record is plain data: `wam_sim.pieces` keeps it as JSON."""
 
     @abstractmethod
     def score(self, records: Sequence[Record]) -> Scores:
-        """What follows from the records of all seeds, or of one."""
+        """Compare what was measured with what is required, from the records of all seeds or of one."""
 
     def panels(self, records: Sequence[Record]) -> Sequence[Panel]:
-        """What is drawn of the records; none where the study has no picture."""
+        """Panels of the picture of the records; none where the study has no picture."""
         return ()
 
     def failure(self, record: Record) -> str:
@@ -108,7 +108,7 @@ class Measurement(NamedTuple):
 
     @property
     def scores(self) -> Scores:
-        """Of all seeds together."""
+        """Scores from the records of all seeds together."""
         return self.study.score(self.total)
 
     @property
@@ -123,7 +123,7 @@ class Measurement(NamedTuple):
 
     @property
     def by_seed(self) -> dict[int, Scores]:
-        """Of each seed alone."""
+        """Scores of each seed, from its records alone."""
         return {seed: self.study.score(own) for seed, own in self.records.items()}
 
 

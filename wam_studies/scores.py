@@ -170,7 +170,7 @@ def percent(name: str, found: Interval, required: Bound = ANY, target: Bound = A
 
 
 def named(rows: Iterable[Row], addition: str) -> Iterator[Row]:
-    """Rows with what they are of."""
+    """Rows with what they are of added to their names."""
     return (row._replace(name=f"{row.name}, {addition}") for row in rows)
 
 
@@ -183,7 +183,7 @@ class ScoreTable(NamedTuple):
     note: str = ""
 
     def text(self) -> str:
-        """In Markdown, with its title."""
+        """The table in Markdown, with its title."""
         parts = [f"## {self.title}", self.note, markdown(self.head, self.rows)]
         return "\n\n".join(filter(None, parts))
 

@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def above_zero(**arguments: ArrayLike) -> list[Array]:
-    """Arguments as arrays.
+    """Arguments of a formula as arrays, each above zero.
 
     Raises
     ------
@@ -20,7 +20,7 @@ def above_zero(**arguments: ArrayLike) -> list[Array]:
 
 
 def zero_or_more(**arguments: ArrayLike) -> list[Array]:
-    """Arguments as arrays.
+    """Arguments of a formula as arrays, each zero or more.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def zero_or_more(**arguments: ArrayLike) -> list[Array]:
 
 
 def finite(**arguments: ArrayLike) -> list[Array]:
-    """Arguments as arrays.
+    """Arguments of a formula as arrays, each finite.
 
     Raises
     ------

@@ -14,7 +14,7 @@ STANDARD_OUTPUT = Path("-")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam analyse` to its parser."""
     parser.add_argument(
         "bag", type=Path, help="directory of a bag, or a file: .mcap, .csv; with the package rosbags also .bag, .db3"
     )
@@ -40,7 +40,7 @@ def _json(text: str) -> Path:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Analyse, print, write."""
+    """Analyse a recording, print the result and write the requested files."""
     if given.steps:
         return _steps(given)
     mapped = topic_map_of(given)

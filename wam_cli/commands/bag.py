@@ -22,7 +22,7 @@ OF_RECORDER = (
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam bag` to its parser."""
     requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
     for name, text in (("info", "print the contents of a bag"), ("repair", "repair a broken bag")):
         requests.add_parser(name, help=text, description=text).add_argument(

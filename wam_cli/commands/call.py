@@ -47,7 +47,7 @@ NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|na
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam call` to its parser."""
     where = argparse.ArgumentParser(add_help=False)
     where.add_argument(
         "--namespace", type=namespace, default=argparse.SUPPRESS, help="namespace of the stack; default: wam"

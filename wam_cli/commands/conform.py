@@ -23,7 +23,7 @@ from wam_ros.priority import set_priority
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam conform` to its parser."""
     take_configuration(parser)
     take_stack(parser)
     parser.add_argument(
@@ -82,7 +82,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the rows as they are found; 1 where one is wrong."""
+    """Test a driver and print the rows of the contract as they are found; 1 where one is wrong."""
     configuration = driver_alone(on_bus(configuration_of(given), given.bus))
     if given.dry_run:
         return _listen(configuration, given.dry_run)

@@ -49,7 +49,7 @@ class PrintedReport(NamedTuple):
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam demo` to its parser."""
     parser.epilog = EXIT_CODES
     take_time(parser)
     played = parser.add_mutually_exclusive_group()
@@ -68,7 +68,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Play, record, report."""
+    """Play and record a demonstration, then print its report."""
     task = load(given.task) if given.task else None
     base = timed(configuration_of(given), given)
     if given.scenario:
@@ -174,7 +174,7 @@ def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
 
 
 class PlayedDemo(NamedTuple):
-    """How it ended: why it failed, if it did, and whether somebody stopped it."""
+    """How a demonstration ended: why it failed, if it did, and whether somebody stopped it."""
 
     failures: list[str]
     stopped: bool

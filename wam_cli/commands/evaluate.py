@@ -27,7 +27,7 @@ from wam_studies.page import block, report, with_section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam evaluate` to its parser."""
     parts = parser.add_subparsers(dest="part", required=True, metavar="STUDY")
     for name in STUDIES:
         kind = load(name)
@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Evaluate; 1 if a required value is missed."""
+    """Evaluate a study or draw the figures; 1 if a required value is missed."""
     return run_study(given) if given.part in STUDIES else figures.run(given)
 
 
@@ -84,7 +84,7 @@ def _add(parser: argparse.ArgumentParser, one: Field[Any]) -> None:
 
 
 def run_study(given: argparse.Namespace) -> int:
-    """Evaluate, print, write; 1 if a required value is missed."""
+    """Evaluate a study, print and write its result; 1 if a required value is missed."""
     study = _study(given)
     cases = {seed: chosen_cases(study, seed, given.cases, given.only or ()) for seed in given.seeds}
     every = [case for own in cases.values() for case in own]

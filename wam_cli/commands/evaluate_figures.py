@@ -8,7 +8,7 @@ from wam_studies.figures.style import draw_panels
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam evaluate figures` to its parser."""
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help=f"figures to draw, of {', '.join(FIGURES)}; default: all"
     )
@@ -19,7 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Compute, draw, print how far the plant is from the lines."""
+    """Compute and draw figures, and print how far the plant is from their lines."""
     names = known(given.names or list(FIGURES))  # before anything is started
     with batch_of(given, len(names)) as batch:
         found = numbers(names, *batch)

@@ -24,7 +24,7 @@ RECORDED = "recorded"  # in the directory of the samples: what they are cut from
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam experiment` to its parser."""
     parser.add_argument("experiment", nargs="*", help="names, or paths of YAML files; --list prints the names")
     parser.add_argument("--list", action="store_true", help="print the name of every experiment")
     parser.add_argument("--all", action="store_true", help="run every experiment")
@@ -58,7 +58,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Run and evaluate."""
+    """Run and evaluate experiments."""
     if given.list:
         for name in names():
             print(f"{name:22} {load(name).title}")

@@ -46,7 +46,7 @@ TOPICS = ("motor_states", "status", *LOADS)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam identify` to its parser."""
     parser.add_argument("bag", nargs="?", type=Path, help="recording of free motion, without contact")
     parser.add_argument(
         "--excite",
@@ -72,7 +72,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Identify."""
+    """Identify the model of the controllers from a bag."""
     if (given.bag is None) == (given.excite is None):
         raise ValueError("give a bag, or --excite SCENARIO to make one")
     require_option(given, "--excite", "--seconds", "--seed", "--only-write", "--directory")

@@ -25,7 +25,7 @@ NEEDS = (
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam live` to its parser."""
     parser.add_argument("bag", nargs="?", type=Path, help="show this recording instead of a running stack")
     where = "namespace of the stack; default: wam. With a bag: that of the arm in it; default: the one with most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Show or serve until Ctrl-C."""
+    """Show a running stack or a bag in the browser until Ctrl-C."""
     require_option(given, "--tf", "--frame-prefix")
     if given.bag is not None and (given.tf or given.trajectories):
         raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")

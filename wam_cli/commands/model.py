@@ -11,7 +11,7 @@ from wam_description.world import World
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam model` to its parser."""
     parser.add_argument(
         "format",
         choices=("urdf", "mjcf", "scorecard"),

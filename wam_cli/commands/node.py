@@ -11,7 +11,7 @@ TAKES_ROS_ARGUMENTS = True
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command; the rest of the line is ROS's."""
+    """Add the options of `wam node` to its parser; the rest of the line is ROS's."""
     known = "driver, transform, velocity_loop, gravity, force_loop, ...; several share one process"
     parser.add_argument("name", nargs="+", help=known)
     parser.usage = "wam node [OPTION...] NAME... [ROS ARGUMENT...]"

@@ -14,7 +14,7 @@ LISTED = 8  # values that are named one by one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam replay` to its parser."""
     parser.epilog = ENDS
     parser.add_argument("bag", help="directory of the bag, or an .mcap file")
     parser.add_argument("node", help=f"{', '.join(REPLAYED)}, or my_package.module:Class")
@@ -40,7 +40,7 @@ def run(given: argparse.Namespace) -> int:
 
 
 def other_values(done: Replay) -> list[str]:
-    """The parameters that --config has otherwise than the recording, which one might not have meant to change."""
+    """A line which names the parameters that differ between --config and the recording; they may be unintended."""
     named = [one.name + f"={_brief(one.used)}" * (not isinstance(one.used, tuple)) for one in done.changed]
     if not named:
         return []
@@ -55,7 +55,7 @@ def _brief(value: object) -> str:
 
 
 def without_effect(values: list[str], done: Replay) -> list[str]:
-    """That nothing has changed with new values, which one would else take for a result."""
+    """A line which states that new values changed nothing, so that nobody takes this for a result."""
     if not values or not done.is_same:
         return []
     why = f"either the recording had these values, or they have no effect on {done.node} with its other parameters"

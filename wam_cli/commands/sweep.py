@@ -41,7 +41,7 @@ ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam sweep` to its parser."""
     parser.add_argument("file", type=TABLE, help="table to write, for example sweep.csv")
     take_configuration(parser)
     what = parser.add_mutually_exclusive_group()
@@ -87,7 +87,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Compute what is not kept from before, write table and plot; 1 where every run failed."""
+    """Run the parameter sets that are not kept from before, write table and plot; 1 where every run failed."""
     require_option(given, "--random", "--seed")
     axes: list[Axis] = given.vary
     _refuse_idle(given, axes)

@@ -30,7 +30,7 @@ WHERE = {
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Add the options of `wam up` to its parser."""
     take_time(parser)
     parser.add_argument("--scenario", type=filled, help="play this scenario: a YAML file, or demo_scenario")
     parser.add_argument("--record", action="store_true", help="record every topic")

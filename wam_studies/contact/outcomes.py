@@ -51,7 +51,7 @@ EVALUATION = EvaluationLimits()
 
 
 class EstimatedMoment(NamedTuple):
-    """One outer period.
+    """The estimate of one outer period.
 
     Attributes
     ----------

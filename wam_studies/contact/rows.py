@@ -147,7 +147,7 @@ def link_rows(
 
 
 def in_groups(scores: Scores, *groups: str) -> list[ContactScore]:
-    """Scores of some groups."""
+    """The scores that belong to one of these groups."""
     return [score for score in scores if score.group in groups]
 
 

@@ -93,7 +93,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
                 yield from (level, level._replace(is_identified=True))
 
     def own_values(self, case: ContactCase) -> Collection[str]:
-        """Parameters of the scenario."""
+        """Parameters that the scenario of a case sets."""
         return case.given.values if isinstance(case.given, BenchmarkScenario) else ()
 
     def score(self, records: Sequence[ContactScore]) -> Scores:

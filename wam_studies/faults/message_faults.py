@@ -38,17 +38,17 @@ class MessageLeaf(NamedTuple):
 
     @property
     def value(self) -> Any:
-        """Its present value."""
+        """Present value of the field."""
         return getattr(self.owner, self.name)
 
     @property
     def is_real(self) -> bool:
-        """Whether it has real numbers."""
+        """Whether the field has real numbers."""
         return self.kind.removeprefix("sequence<").startswith(("double", "float"))
 
     @property
     def is_sequence(self) -> bool:
-        """Whether it has a number of values."""
+        """Whether the field has several values."""
         return self.kind.startswith("sequence")
 
     def put(self, value: Any) -> bool:

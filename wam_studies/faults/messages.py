@@ -37,7 +37,7 @@ class MessagePlan(NamedTuple):
 
     @property
     def name(self) -> str:
-        """In words."""
+        """The plan in words: topic, publisher and fault."""
         return f"{self.topic}, {'second' if self.is_foreign else 'own'} publisher, {self.fault.name}"
 
 

@@ -90,11 +90,11 @@ class SoakStudy(Study[SoakCase, SoakRecord]):
     run = staticmethod(soak)
 
     def cases(self, seed: int) -> Iterator[SoakCase]:
-        """The run."""
+        """The one run of a seed."""
         yield SoakCase(self.configuration, seed, self.seconds)
 
     def failure(self, record: SoakRecord) -> str:
-        """Why it stopped, and what the bag lacks."""
+        """Why the run stopped, and what its bag lacks; '' where all is well."""
         return "; ".join(filter(None, [record.failure, *record.losses]))
 
     def score(self, records: Sequence[SoakRecord]) -> Scores:

@@ -72,11 +72,11 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
                 yield FaultCase(configuration, name, seed, number)
 
     def own_values(self, case: FaultCase) -> Mapping[str, Any]:
-        """Those of the kind."""
+        """Parameters that the kind of fault sets."""
         return KINDS[case.kind].values
 
     def failure(self, record: FaultTrial) -> str:
-        """What escaped."""
+        """What escaped in a trial, with its name; '' where nothing did."""
         return f"{record.kind}, {record.name}: {'; '.join(record.escapes)}" if record.escapes else ""
 
     def score(self, records: Sequence[FaultTrial]) -> Scores:

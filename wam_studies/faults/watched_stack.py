@@ -134,7 +134,7 @@ class WatchedStack(StackClient):
             super()._hear(data)
 
     def take_status(self, status: NodeStatus) -> None:
-        """An exception in a node is an escape."""
+        """Take a status; one that reports an exception in a node is an escape."""
         if any(event.values.get(CAUSE) == RAISED for event in status.events):
             self._escape(f"{status.node}: {status.message[:200]}")
 
@@ -164,7 +164,7 @@ class WatchedStack(StackClient):
     # time
 
     def spin_once(self, seconds: float = 0.01) -> None:
-        """One callback; a node that raises is an escape of its own."""
+        """Run one callback; a node that raises is an escape of its own."""
         try:
             super().spin_once(seconds)
         except Exception as error:

@@ -15,7 +15,7 @@ from wam_studies.figures.panels import Panel, Panels, line_only
 
 
 class Backdriven(NamedTuple):
-    """At the tip, in one pose, over directions.
+    """What a push at the tip meets in one pose, over its directions.
 
     Attributes
     ----------

@@ -6,7 +6,7 @@ from typing import Final
 
 @dataclass(frozen=True)
 class FigureConditions:
-    """By figure: loads, steps, poses, frictions."""
+    """Conditions of the figures: loads, steps, poses, frictions."""
 
     # several
     contact: float = 1464.28  # k_c, N m/rad: 10 lb/in at the tip

@@ -85,7 +85,7 @@ def period_map(arm: Arm, contact: float = CASE.contact) -> tuple[Numbers, Number
 
 
 def plant_period_map(arm: Arm) -> tuple[Numbers, Numbers]:
-    """The same by stepping the plant from each unit state and under a unit torque."""
+    """State after a period from the state, (4, 4), and from a held motor torque, (4, 1), by steps of the plant."""
     plant = released_plant(arm, against_spring(CASE.contact), CASE.period / CASE.substeps)
     state, inlet = stepped_map(plant, CASE.substeps)
     return state, inlet[:, None]

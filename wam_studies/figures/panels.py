@@ -36,7 +36,7 @@ class Series(NamedTuple):
         return float(np.abs(self.plant_y / line - 1.0).max())
 
     def scaled(self, x: float, y: float) -> "Series":
-        """In other units."""
+        """The series in other units: x and y times these factors."""
         return Series(x * self.x, y * self.y, x * self.plant_x, y * self.plant_y)
 
 

@@ -44,17 +44,17 @@ class Driven(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """N."""
+        """Transmission ratio N, turns of the motor per turn of the joint."""
         return 1.0 / self.arm.joint_from_motor[0]
 
     @property
     def stiffness(self) -> float:
-        """At the joint, N m/rad, as configured."""
+        """Configured stiffness of the transmission at the joint, N m/rad."""
         return self.ratio**2 * self.arm.circuits[0].stiffness
 
     @property
     def smooth(self) -> "Driven":
-        """With the friction of the cables, which is the same without load."""
+        """The transmission with the friction of the cables, which does not depend on the load."""
         return self._replace(friction=driven("cables").friction)
 
     def plant(
@@ -103,7 +103,7 @@ BREAKAWAY, HEAVIER = "torque that backdrives it [N m]", "mass and heat of the mo
 
 
 def predicted(kind: str) -> Measures:
-    """At the joint, by formulas of shaft, cable and gears."""
+    """Quantities of a transmission at the joint by the formulas of shaft, cable and gears."""
     it = driven(kind)
     motors, joints, cables = it.arm.motors, it.arm.joints, it.arm.cables
     rotor = motors.inertia[0]
@@ -133,7 +133,7 @@ def predicted(kind: str) -> Measures:
 
 @cache
 def measured(kind: str) -> Measures:
-    """On the plant, without mass and heat of the motor."""
+    """Quantities of a transmission measured on the plant, without mass and heat of the motor."""
     it = driven(kind)
     near, far = (_deflection(it, torque) for torque in (CASE.near_load, CASE.far_load))
     stiffness = (CASE.far_load - CASE.near_load) / (far - near)

@@ -45,7 +45,7 @@ class UsualController:
         outputs=("joint_velocity_command", "joint_effort_command", "external_torque_zero"),
     )
     def step(self, inputs: Inputs) -> Outputs:
-        """One outer period."""
+        """Compute velocities and torques of the joints for one outer period."""
         joints, command, torques = (inputs[t] for t in ("joint_states", "force_command", "external_joint_torques"))
         q = np.array(joints.position)
         self._start = q if self._start is None else self._start

@@ -32,7 +32,7 @@ class TaskGrouping(NamedTuple):
         return self.classes[self.of(task)]
 
     def trials(self, every: Sequence[ForceTrial], name: str) -> list[ForceTrial]:
-        """Those of a class."""
+        """Trials of the tasks of a class."""
         return [trial for trial in every if self.name(trial.task) == name]
 
     def results(self, every: Sequence[ForceTrial]) -> dict[str, list[TaskResult]]:
@@ -120,7 +120,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     run = staticmethod(play)
 
     def own_values(self, case: ForceTaskCase) -> Collection[str]:
-        """What the task declares."""
+        """Parameters that the task of a case declares."""
         return task_values(case.configuration, case.task)
 
     def score(self, records: Sequence[ForceTrial]) -> Scores:

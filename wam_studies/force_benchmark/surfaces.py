@@ -73,7 +73,7 @@ class Surface(NamedTuple):
 
 
 def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
-    """Whether it touches nothing in the pose q, rad, and no other part of the arm is nearer than `SHAPE.clearance`."""
+    """Whether a surface touches nothing in the pose q, rad, and only its link is nearer than `SHAPE.clearance`."""
     covers = body.arm.covers
     centre, axis, into = position(body, q, surface), rotation(body, q, surface)[:, 2], np.array(surface.direction)
     for name, radius, length in zip(covers.names, covers.radius, covers.length, strict=True):

@@ -143,7 +143,7 @@ class Task(NamedTuple):
 
     @property
     def mistake(self) -> float:
-        """By how much the user declares the touched position too far along the link, m."""
+        """Distance by which the user declares the touched position too far along the link, m."""
         return self.misplaced if self.is_pinned and not self.second else 0.0
 
 
@@ -155,7 +155,7 @@ class ElbowJoint(NamedTuple):
 
     @classmethod
     def of(cls, body: RigidBody) -> "ElbowJoint":
-        """That of an arm, which has two covers or more."""
+        """The elbow of an arm that has two covers or more."""
         arm = body.arm
         inner, outer = arm.covers.names[:2]
         joint, zero = arm.links.names.index(arm.covers.links[1]), [0.0] * len(arm.joints.names)

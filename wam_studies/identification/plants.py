@@ -77,11 +77,11 @@ class DrawnArm(NamedTuple):
     arm: Arm
 
     def around(self, low: float, high: float, count: int) -> list[float]:
-        """Numbers between two ends."""
+        """Random numbers between two ends."""
         return self.random.uniform(low, high, count).tolist()
 
     def each_motor(self, low: float, high: float) -> list[float]:
-        """One for each motor."""
+        """A random number between two ends for each motor."""
         return self.around(low, high, len(self.arm.motors.names))
 
     def level(self, low: float, high: float) -> Values:
@@ -105,7 +105,7 @@ class DrawnArm(NamedTuple):
         return {f"driver:friction.{key}": (size * self.random.choice((-1.0, 1.0), shafts)).tolist() for key in keys}
 
     def encoder(self, counts: int) -> Values:
-        """So many counts per turn."""
+        """Encoders of so many counts per turn."""
         return {"driver:sensors.encoder_resolution": [2.0 * math.pi / counts] * len(self.arm.motors.names)}
 
     def cogging(self, amplitude: float) -> Values:
@@ -125,7 +125,7 @@ class DrawnArm(NamedTuple):
         return {"arm.links.centre": np.add(centre, self.around(-metres, metres, len(centre))).tolist()}
 
     def constant(self, width: float) -> tuple[float, ...]:
-        """Measured over true torques."""
+        """Torque constants: measured over true torque of each motor, within a largest error."""
         return tuple(self.each_motor(1.0 - width, 1.0 + width))
 
     def noise(self, level: float) -> Values:

@@ -178,12 +178,12 @@ def error_of(name: str) -> float:
 
 
 def errors() -> dict[str, float]:
-    """That of each effect; in parallel, and what was measured with this code is kept."""
+    """Greatest difference of each effect from theory, in parallel; what was measured with this code is kept."""
     with processes() as executor:
         return dict(zip(EFFECTS, results(error_of, list(EFFECTS), executor, default_file("plant")), strict=True))
 
 
 def table(found: Mapping[str, float]) -> str:
-    """Those differences as Markdown."""
+    """Table of the greatest differences from theory as Markdown."""
     rows = [(n, "below 0.001 %" if e < 1e-5 else f"{100.0 * e:.2g} %") for n, e in found.items()]
     return markdown(("effect", "greatest difference from theory"), rows)

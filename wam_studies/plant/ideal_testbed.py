@@ -150,7 +150,7 @@ def loop_arm(damping: float, friction: tuple[float, float]) -> Arm:
 def loop_plant(
     arm: Arm, stiffness: float, unilateral: bool = False, step: float = STEP, backlash: float = 0.0
 ) -> Plant:
-    """Its plant against a spring, N m/rad; a unilateral one pushes at angles below zero; backlash at the joint, rad."""
+    """Plant of an arm against a spring, N m/rad; a unilateral one pushes at angles below zero; backlash in rad."""
     return released_plant(arm, against_spring(stiffness, unilateral), step, backlash=(RATIO * backlash,))
 
 

@@ -38,14 +38,14 @@ class OneLink(NamedTuple):
 
     @property
     def gamma(self) -> float:
-        """(5.15) of the continuous loop."""
+        """Gain ratio gamma (5.15) of the continuous loop."""
         n = self.node
         stiffness = n.transmission_stiffness, n.contact_stiffness
         return float(gain_ratio(self.loop.gain, n.inertia, n.damping, *stiffness))
 
     @property
     def zeta(self) -> float:
-        """(5.12)."""
+        """Damping ratio zeta (5.12)."""
         n = self.node
         return float(damping_ratio(n.inertia, n.damping, n.transmission_stiffness, n.contact_stiffness))
 
@@ -108,18 +108,18 @@ class TestbedStep(NamedTuple):
 
     @property
     def desired(self) -> float:
-        """Commanded force at its start, N."""
+        """Commanded force at the start of the step, N."""
         command = self.run.forces("force_command")
         return float(np.linalg.norm(command.force[np.searchsorted(command.time, self.time[0] - 1e-9)]))
 
     @property
     def start(self) -> tuple[float, float, float]:
-        """x, v and x_m at its start."""
+        """x, v and x_m at the start of the step."""
         x = float(self.force[0]) * self.link.lever / self.link.node.contact_stiffness
         return x, float(self.speed[0]), float(self.motor[0])
 
     def exact(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0), is_sampled: bool = True) -> Motion:
-        """The exact motion at its times.
+        """The exact motion at the times of the step.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class TestbedStep(NamedTuple):
         return motion.at(self.time - self.time[0])
 
     def exact_line(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0), is_sampled: bool = True) -> Line:
-        """The exact force over time, named; arguments as of `exact`."""
+        """The exact force over time as a named line; the arguments are those of `exact`."""
         return "exact", line_only(self.time, self.exact(start, is_sampled).contact_force / self.link.lever)
 
     @property

@@ -14,7 +14,7 @@ HEAD = ("experiment", "within bounds", "nearest to its bound", *PAGE_HEAD[1:])
 
 
 def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> None:
-    """Write a row and a picture of each experiment into a page; those of others stay.
+    """Write a row and a picture of each experiment into a page, and keep the rows of others.
 
     Parameters
     ----------

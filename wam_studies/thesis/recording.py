@@ -44,7 +44,7 @@ class Forces(NamedTuple):
 
     @property
     def across(self) -> Numbers:
-        """Size across the link's axis, (k,) N."""
+        """Size of the force across the link's axis, (k,) N."""
         found: Numbers = np.hypot(self.force[:, 1], self.force[:, 2])
         return found
 
@@ -109,7 +109,7 @@ class Recording(NamedTuple):
 
     @property
     def shared(self) -> Shared:
-        """What every node read."""
+        """Parameters that every node read."""
         return self.parameters.shared
 
     def node(self, name: str, cls: type[T]) -> T:
@@ -121,12 +121,12 @@ class Recording(NamedTuple):
         return self.parameters.part(name, cls, f"{prefix}.")
 
     def joints(self, topic: str) -> RecordedJoints:
-        """A JointState topic."""
+        """Recorded columns of a JointState topic."""
         columns = self.columns(topic, JointColumns)
         return RecordedJoints(columns.stamp_ns / 1e9, columns.position, columns.velocity, columns.effort)
 
     def forces(self, topic: str) -> Forces:
-        """A WrenchStamped topic."""
+        """Recorded forces of a WrenchStamped topic."""
         columns = self.columns(topic, WrenchColumns)
         return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, tuple(columns.frames))
 

@@ -54,7 +54,7 @@ def frequency_response(runs: Runs) -> Result:
 
 
 def resonances(run: Recording) -> Resonances:
-    """(4.4) from the recorded parameters, rad/s."""
+    """Resonances (4.4) from the recorded parameters, rad/s."""
     arm = run.shared.arm
     motor, ratio = arm.motors.inertia[0], 1.0 / arm.joint_from_motor[0]
     return force_resonances(motor, link_inertia(arm), arm.circuits[0].stiffness, joint_stiffness(run), ratio)
