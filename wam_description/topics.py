@@ -6,7 +6,7 @@ written from both, nodes take their types and QoS from here, the recorder record
 """
 
 from functools import cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from wam_description.signals import ObjectState
 
@@ -144,6 +144,7 @@ class Topic(NamedTuple):
     side : 'motors' or 'joints': whose names a JointState carries.
     columns : of a table, float64 each.
     needs_joint_sensors : whether it exists only on an arm with joint-side sensors.
+    is_viewed : whether viewers show it, for which its publisher copies some of its messages.
     """
 
     name: str
@@ -153,6 +154,7 @@ class Topic(NamedTuple):
     side: str = ""
     columns: tuple[str, ...] = ()
     needs_joint_sensors: bool = False
+    is_viewed: bool = False
 
     def check(self) -> None:
         """Refuse a row that a node cannot add: a type, a rate or a side that does not exist.
@@ -196,8 +198,8 @@ def _motors(name: str, rate: str, doc: str) -> Topic:
     return Topic(name, JOINT_STATE, rate, doc, "motors")
 
 
-def _joints(name: str, rate: str, doc: str, needs_joint_sensors: bool = False) -> Topic:
-    return Topic(name, JOINT_STATE, rate, doc, "joints", needs_joint_sensors=needs_joint_sensors)
+def _joints(name: str, rate: str, doc: str, **more: Any) -> Topic:
+    return Topic(name, JOINT_STATE, rate, doc, "joints", **more)
 
 
 TOPICS: Final = (
@@ -211,7 +213,9 @@ TOPICS: Final = (
         "friction",
         needs_joint_sensors=True,
     ),
-    _joints("joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m"),
+    _joints(
+        "joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m", is_viewed=True
+    ),
     _joints("gravity_effort", "outer", "effort = torque that carries the links, N m"),
     _joints(
         "joint_velocity_command",
@@ -262,7 +266,11 @@ TOPICS: Final = (
         columns=TASK_AXIS_COLUMNS,
     ),
     Topic(
-        "force_measured", WRENCH, "outer", "force of the arm on the world along the commanded direction, measured, N"
+        "force_measured",
+        WRENCH,
+        "outer",
+        "force of the arm on the world along the commanded direction, measured, N",
+        is_viewed=True,
     ),
     Topic("force_error", WRENCH, "outer", "F_error, commanded less measured force, before saturation, N"),
     Topic("force_error_limited", WRENCH, "outer", "F_error after saturation, N"),
@@ -301,6 +309,7 @@ TOPICS: Final = (
         "one row per hypothesis, the most probable first; no row without contact; float64 columns: see "
         "docs/estimator.md",
         columns=HYPOTHESIS_COLUMNS,
+        is_viewed=True,
     ),
     Topic(
         "contact/tracked_friction",
@@ -317,14 +326,21 @@ TOPICS: Final = (
         "display",
         "the contact as an arrow and a sphere; a band along the links that contains it with 90 % probability",
     ),
-    _joints("sim/joint_states", "outer", "truth: joint angles, velocities, torques through the cables"),
+    _joints("sim/joint_states", "outer", "truth: joint angles, velocities, torques through the cables", is_viewed=True),
     Topic(
         "sim/contact/wrench",
         WRENCH,
         "outer",
         "truth: force of the world on the link with the largest load; frame = its cover, moment about its origin",
+        is_viewed=True,
     ),
-    Topic("sim/contact/point", POINT, "outer", "truth: x = position along that link, NaN without contact"),
+    Topic(
+        "sim/contact/point",
+        POINT,
+        "outer",
+        "truth: x = position along that link, NaN without contact",
+        is_viewed=True,
+    ),
     Topic(
         "sim/objects",
         TABLE,
@@ -332,6 +348,7 @@ TOPICS: Final = (
         "truth: one row per free body, door and moving obstacle, if there are any; frame base; float64 "
         "columns: see docs/tasks.md",
         columns=ObjectState._fields,
+        is_viewed=True,
     ),
     Topic(
         "sim/disturbance",

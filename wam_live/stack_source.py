@@ -17,10 +17,11 @@ from wam_description.topics import BY_NAME
 from wam_live.snapshot import NAN, Snapshot, objects_of, size
 from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, message_type
-from wam_ros.outlets import COPIED, NEWEST, copy_name
+from wam_ros.outlets import NEWEST, copy_name
 from wam_ros.wire import decoder, stamp_of
 
-TOPICS: Final = (*sorted(COPIED), "force_command")  # of which everybody may be the publisher
+VIEWED: Final = sorted(topic.name for topic in BY_NAME.values() if topic.is_viewed)
+TOPICS: Final = (*VIEWED, "force_command")  # of which everybody may be the publisher
 
 
 class RunningStack:
@@ -42,7 +43,7 @@ class RunningStack:
         self._decoders = {
             name: decoder(BY_NAME[name], shared, "position?" if "joint" in name else "") for name in TOPICS
         }
-        self._whole = set(COPIED)  # of which all messages are taken, because copies have not been found
+        self._whole = set(VIEWED)  # of which all messages are taken, because copies have not been found
         self._newest: dict[str, Any] = {}
         self._stamps: dict[str, int] = {}
         self.statuses = statuses

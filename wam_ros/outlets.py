@@ -23,17 +23,6 @@ from wam_ros.wire import encoder
 
 PERIOD: Final = 1.0 / 30.0  # s of the wall clock, between copies
 NEWEST: Final = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, history=HistoryPolicy.KEEP_LAST, depth=1)
-COPIED: Final = frozenset(
-    (
-        "joint_states",
-        "sim/joint_states",
-        "sim/contact/wrench",
-        "sim/contact/point",
-        "sim/objects",
-        "contact/hypotheses",
-        "force_measured",
-    )
-)
 
 
 def copy_name(topic: str) -> str:
@@ -86,7 +75,7 @@ class Outlets:
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
         }
-        self._copies = {row.name: DisplayCopy(node, row) for row in rows if row.name in COPIED}
+        self._copies = {row.name: DisplayCopy(node, row) for row in rows if row.is_viewed}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
         self.published = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}

@@ -67,9 +67,9 @@ from wam_live.panel import DITHER, FORCES, NO_PRESS, Bend, Controls, Play, Press
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import Grip, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
-from wam_live.stack_source import RunningStack  # noqa: E402
+from wam_live.stack_source import VIEWED, RunningStack  # noqa: E402
 from wam_ros.messages import message_type  # noqa: E402
-from wam_ros.outlets import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
+from wam_ros.outlets import PERIOD, DisplayCopy, copy_name  # noqa: E402
 from wam_ros.ros_topics import qos  # noqa: E402
 from wam_ros.wire import encoder  # noqa: E402
 
@@ -536,7 +536,7 @@ def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
         node = composition.nodes["driver"]
 
         def whole() -> set[str]:
-            listeners = {name: node.get_subscriptions_info_by_topic(f"/wam/{name}") for name in COPIED}
+            listeners = {name: node.get_subscriptions_info_by_topic(f"/wam/{name}") for name in VIEWED}
             return {name for name, found in listeners.items() if any(one.node_name == "live_view" for one in found)}
 
         shown.wait(lambda: not whole(), spin)
