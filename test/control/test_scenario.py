@@ -529,7 +529,7 @@ def test_after_a_trajectory_or_a_line_it_is_known_where_the_next_motion_begins(m
         load_for(CONFIGURATION, str(write(tmp_path, {"steps": steps})))
 
 
-def test_only_of_a_simulated_arm_it_is_known_where_it_begins_and_can_the_time_be_stopped(tmp_path: Path) -> None:
+def test_only_of_a_simulated_arm_it_is_known_where_it_begins_a_real_one_is_braked_at_the_end(tmp_path: Path) -> None:
     far = [WAM.joints.start[0] + 1.0, *WAM.joints.start[1:]]
     path = write(tmp_path, {"steps": [{"name": "go", "seconds": 0.1, "posture": far}]})
     with pytest.raises(ParameterError, match="'go': joint1 goes from"):
@@ -537,7 +537,7 @@ def test_only_of_a_simulated_arm_it_is_known_where_it_begins_and_can_the_time_be
     assert len(load(path, SHARED)) == 1, "played into a stack that runs, by an arm that may be there"
     others = [name for name in SHARED.nodes if name != "driver"]
     assert len(load_for(CONFIGURATION.with_values({"nodes": others}), str(path))) == 1
-    for nodes, requests in ((SHARED.nodes, [Call("driver", "pause", True)]), (tuple(others), [])):
+    for nodes, requests in ((SHARED.nodes, [Call("driver", "pause", True)]), (tuple(others), [Call("driver", "enable", False)])):
         scenario = Scenario([ScenarioStep("wait", 0.005)])
         node = ScenarioNode(replace(SHARED, nodes=nodes), ScenarioParameters(""), scenario)
         for tick in range(3):

@@ -88,8 +88,8 @@ class ScenarioNode:
         for node in dict.fromkeys(setting.node for setting in out.settings):
             values = {setting.name: _plain(setting) for setting in out.settings if setting.node == node}
             self.requests.append(SetParameters(node, values))
-        if out.done and self._is_simulated:  # the time of a real arm cannot be stopped
-            self.requests.append(Call("driver", "pause", True))
+        if out.done:  # all nodes end with this one; the time of a real arm cannot be stopped
+            self.requests.append(Call("driver", *(("pause", True) if self._is_simulated else ("enable", False))))
 
     def refused(self, message: str) -> Outputs:
         """End the task where a request is refused."""
