@@ -1,4 +1,4 @@
-"""What a node reports: its status, latched, where it changes, and once a second its diagnostics."""
+"""What a node reports: its status, latched, where it changes; a driver in realtime repeats it; its diagnostics."""
 
 import time
 from collections import Counter

@@ -190,7 +190,7 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
         if not is_reported and silent > CALL_LIMITS.silence:
             is_reported = True
             row = BY_NAME.get(given.topic)
-            seldom = ", which is published only when it changes" * bool(row and row.latched)
+            seldom = ", which is published when it changes" * bool(row and row.latched)
             ends = "Ctrl-C ends this" + "; --timeout S ends it after S seconds" * (given.timeout is None)
             print(f"{waits}{seldom}{_hint(given.topic, stack)}; {ends}", file=sys.stderr, flush=True)
 
