@@ -60,8 +60,8 @@ class DryFriction:
         self._presliding = {i: Presliding(sigma) for i, sigma in enumerate(stiffness) if sigma > 0.0}
         self._varying = [i for i, law in enumerate(self._laws) if not law.is_steady or i in self._presliding]
         self.is_steady = not self._varying
-        self._circuits = list(zip(effects.tension_friction, arm.circuits, strict=True))
-        self._added = effects.added_coulomb_friction
+        self._tension_friction, self._circuits = effects.tension_friction, tuple(arm.circuits)
+        self._added = tuple(effects.added_coulomb_friction)
         self._step = step
         self._shafts = range(size)
         self._warm_drop, self._warm = parameters.warm_drop, [1.0] * size
@@ -72,7 +72,7 @@ class DryFriction:
         self._bounds = [((-v, v), (0.0, math.inf), (-math.inf, 0.0)) for v in slowest]
         self.direction = [0] * size
         self._low, self._high = self.bounds = [0.0] * size, [0.0] * size
-        self.set_circuits(arm.circuits)
+        self._find_levels()
         self.reset()
 
     def reset(self) -> None:
@@ -87,20 +87,22 @@ class DryFriction:
 
     def set_circuits(self, circuits: Sequence[Circuit]) -> None:
         """Take the pretension of each circuit, (n,), for the friction by tension (6.5)."""
-        self._circuits = [
-            (per_tension, circuit) for (per_tension, _), circuit in zip(self._circuits, circuits, strict=True)
-        ]
-        self._from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in self._circuits]
-        self._renew_levels()
+        self._circuits = tuple(circuits)
+        self._find_levels()
 
     def set_added(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
         self._added = tuple(friction)
-        self._renew_levels()
+        self._find_levels()
 
-    def _renew_levels(self) -> None:
-        """Static and dynamic friction of each shaft, N m; those that vary in motion are computed in each step."""
-        self._extra = [*self._from_tension, *self._added]
+    def _find_levels(self) -> None:
+        """Find the static and dynamic friction of each shaft, N m, from pretension, what is added, and heat.
+
+        Those that vary in motion are computed in each step.
+        """
+        each_circuit = zip(self._tension_friction, self._circuits, strict=True)
+        from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in each_circuit]
+        self._extra = [*from_tension, *self._added]
         each = list(zip(self._laws, self._warm, self._extra, strict=True))
         self._static = [law.level(0.0, 0, 0.0) * warm + extra for law, warm, extra in each]
         self._dynamic = [law.level(1.0, 1, 0.0) * warm + extra for law, warm, extra in each]
@@ -111,7 +113,7 @@ class DryFriction:
         """Take the heat of each motor, (n,), 1 at its thermal limit, for friction that falls with temperature."""
         left = [1.0 - self._warm_drop * min(w, 1.0) for w in heat]
         self._warm[: len(left)] = left
-        self._renew_levels()
+        self._find_levels()
 
     def follow(self, velocity: Sequence[float], load: Sequence[float] = (), held: Sequence[float] = ()) -> bool:
         """Bring `levels` and `elastic` up to date for the next step.
@@ -149,7 +151,8 @@ class DryFriction:
         transmitted : torque that the cables transmit to each rotor, N m.
         """
         levels = self.levels.copy()
-        for i, ((per_tension, circuit), torque) in enumerate(zip(self._circuits, transmitted, strict=False)):
+        each_circuit = zip(self._tension_friction, self._circuits, transmitted, strict=False)
+        for i, (per_tension, circuit, torque) in enumerate(each_circuit):
             excess = abs(torque) / circuit.radius - 2.0 * circuit.pretension
             levels[i] += per_tension * max(excess, 0.0)
         return levels
