@@ -39,18 +39,10 @@ class ArmDriver(StackNode):
     ----------
     safety : state of the brakes.
     session : that the other nodes follow.
-    lateness : how many periods were late and what to do about it, '' where few were.
-    warnings : what a person should know, though the arm may move.
-    unready : what the arm still lacks before it may be enabled, '' where nothing.
-    advice : what a person at the arm has to do for that, '' where nothing.
-    is_paused : whether the time of the arm is stopped.
     """
 
     is_first = True
     safety: Safety
-    lateness = unready = advice = ""
-    warnings: tuple[str, ...] = ()
-    is_paused = False
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration, **ros)
@@ -61,9 +53,9 @@ class ArmDriver(StackNode):
         self._reported: tuple[Any, ...] = ("",)
         self._informed = ("", True, tuple[str, ...](), "")  # mode, are nodes missing, faulty nodes, advice
         self.inlets.feed("motor_current_command", self._take_currents, "effort")
-        self.serve("enable", SetBool, lambda request: self.enable() if request.data else self.brake())
+        self.serve("enable", SetBool, lambda request: self.enable() if request.data else self.disable())
         self.serve("estop", Trigger, lambda _: self.estop())
-        self.serve("reset_fault", Trigger, lambda _: self.clear())
+        self.serve("reset_fault", Trigger, lambda _: self.reset_fault())
         self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
         self.create_timer(NODE_LIMITS.claim_period, self._forget_nodes)
 
@@ -78,25 +70,34 @@ class ArmDriver(StackNode):
         """Take currents, A, that answer the state of a stamp, ns."""
         raise NotImplementedError
 
-    def release(self, obstacle: str) -> Answer:
-        """Let the motors follow commands from now on, unless an obstacle is named."""
-        raise NotImplementedError
-
-    def brake(self) -> Answer:
-        """Brake at once."""
-        raise NotImplementedError
-
-    def clear(self) -> Answer:
-        """Clear a latched fault; the arm stays braked."""
-        raise NotImplementedError
-
-    def trip(self, event: Event) -> None:
-        """Brake and latch a fault, and `announce` it."""
-        raise NotImplementedError
-
     def obstacle(self) -> str:
         """What speaks against a release of the brakes, when all else is well; '' where nothing does."""
         return ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know, though the arm may move."""
+        return ()
+
+    @property
+    def unready(self) -> str:
+        """What the arm still lacks before it may be enabled, '' where nothing."""
+        return ""
+
+    @property
+    def advice(self) -> str:
+        """What a person at the arm has to do for that, '' where nothing."""
+        return ""
+
+    @property
+    def lateness(self) -> str:
+        """How many periods were late and what to do about it, '' where few were."""
+        return ""
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the time of the arm is stopped."""
+        return False
 
     # what every driver does
 
@@ -112,20 +113,30 @@ class ArmDriver(StackNode):
 
     def enable(self) -> Answer:
         """Let the motors follow commands, unless there is a reason against it."""
-        if self.safety.mode is Mode.ENABLED:
-            return Answer(True, "enabled already: nothing has changed")
         rival = TWO_DRIVERS if self.count_publishers("motor_states") > 1 else ""
         faults = "; ".join(f"{node}: {why}" for node, why in self.peers.faulty.items())
-        return self.release(self.health.problem or self.unready or rival or faults or self.obstacle())
+        return self.safety.enable(self.health.problem or self.unready or rival or faults or self.obstacle())
+
+    def disable(self) -> Answer:
+        """Brake at once."""
+        return self.safety.disable()
 
     def estop(self) -> Answer:
         """Stop at once and latch a fault."""
-        self.trip(fault("emergency_stop"))
-        return self.safety.stopped
+        return self.safety.estop()
+
+    def reset_fault(self) -> Answer:
+        """Clear a latched fault; the arm stays braked."""
+        return self.safety.reset_fault()
+
+    def trip(self, event: Event) -> None:
+        """Brake, latch a fault, and `announce` it."""
+        self.safety.trip(event)
+        self.announce()
 
     def end(self) -> None:
         """Put on the brakes at once; the others hear of it when the node is destroyed."""
-        self.brake()
+        self.disable()
         self.announce()
 
     def destroy_node(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
-from wam_description.event import Event, fault
+from wam_description.event import fault
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import lengths, parameter, require, rows
@@ -111,7 +111,7 @@ class Driver:
 
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
         arm, timing = shared.arm, shared.timing
-        self.safety = Safety()
+        self.safety = Safety(self._begin, self._discard)
         random = np.random.Generator(np.random.PCG64(parameters.seed))
         true = true_arm(arm, parameters.mismatch)
         self.plant = Plant(
@@ -140,10 +140,15 @@ class Driver:
         self._last_push = "", 0  # the last pushes of an enabled arm, in words, and the tick in which they acted
         self._pretension_share = parameters.effects.pretension_share
         self._begin_period(1)
-        self._release()
+        self._discard()
         self._measure()
 
-    def _release(self) -> None:
+    def _begin(self) -> None:
+        """Follow commands from now on, none from before."""
+        self._discard()
+        self._watch.begin(self.plant.theta)
+
+    def _discard(self) -> None:
         """Discard every command; all currents are zero until a new one arrives."""
         self._command = self._zero
         self._command_tick = self._tick
@@ -181,7 +186,9 @@ class Driver:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:
                 allowed_ms = self._parameters.watchdog * 1e3
-                self.fault(fault("command_stale", age_ms=age * 1e3, allowed_ms=allowed_ms, cure=self.stale_advice()))
+                self.safety.trip(
+                    fault("command_stale", age_ms=age * 1e3, allowed_ms=allowed_ms, cure=self.stale_advice())
+                )
                 enabled = False
         self.plant.brake(not enabled)
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
@@ -191,7 +198,7 @@ class Driver:
         self.plant.step(torque, self._timing.substeps)
         if trouble := self.plant.trouble():
             self.plant.recover()
-            self.fault(fault("simulation", trouble=trouble, cure=self._advice))
+            self.safety.trip(fault("simulation", trouble=trouble, cure=self._advice))
             enabled = False
         self._begin_period(self._tick + 1)
         self._measure()
@@ -218,9 +225,9 @@ class Driver:
             if heat > DRIVER.warning
         ]
         if watched and (excess := next(filter(None, (limit.excess for limit in watched)), "")):
-            self.fault(fault("limit", excess=excess, cure=self._advice))
+            self.safety.trip(fault("limit", excess=excess, cure=self._advice))
         elif sunk := self.plant.sunk():
-            self.fault(fault("sunk", reason=sunk))
+            self.safety.trip(fault("sunk", reason=sunk))
 
     @property
     def _advice(self) -> str:
@@ -246,11 +253,6 @@ class Driver:
         tensions = self.plant.tight_tensions(list(map(max, self._zero, *self._pulls)))
         self._pulls.clear()
         return tensions
-
-    def fault(self, event: Event) -> None:
-        """Stop, also for a reason that is known outside the driver; brakes on, latched."""
-        self.safety.trip(event)
-        self._release()
 
     def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
         """Push on a cover until the next push on it, for `ages.command` of the arm's time at most; see `Plant.push`.
@@ -301,25 +303,11 @@ class Driver:
             self.plant.set_pretension(effects.pretension_share)
             self._pretension_share = effects.pretension_share
 
-    def enable(self, obstacle: str) -> Answer:
-        """Release the brakes and discard every command received before, unless an `obstacle` is named."""
-        if self.safety.mode is Mode.ENABLED:
-            return Answer(True, "enabled already: nothing has changed")
-        answer = self.safety.enable(obstacle)
-        if answer.success:
-            self._release()
-            self._watch.begin(self.plant.theta)
-        return answer
-
-    def disable(self) -> Answer:
-        """Put on the brakes."""
-        self._release()
-        return self.safety.disable()
+    # what a node of a direct run may request by name
 
     def estop(self) -> Answer:
-        """Stop at once and latch a fault, as a node of a direct run may request."""
-        self.fault(fault("emergency_stop"))
-        return self.safety.stopped
+        """Stop at once and latch a fault."""
+        return self.safety.estop()
 
     def reset_fault(self) -> Answer:
         """Clear a latched fault; the arm stays braked."""
@@ -327,7 +315,7 @@ class Driver:
 
     def reset(self) -> Answer:
         """Put the simulated arm back to power-up, braked; time continues."""
-        self.disable()
+        self.safety.disable()
         self.plant.reset()
         self.amplifier.reset()
         self._sensors.reset()

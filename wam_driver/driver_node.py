@@ -7,7 +7,6 @@ from typing import Any
 
 from std_srvs.srv import SetBool, Trigger
 
-from wam_description.event import Event
 from wam_description.interface import declared
 from wam_description.signals import Answer, Wrench
 from wam_driver.arm_driver_node import ArmDriver
@@ -88,39 +87,22 @@ class DriverNode(ArmDriver):
         """Take currents, A, that answer the state of a stamp, ns."""
         self.time.take_currents(stamp, currents)
 
-    def release(self, obstacle: str) -> Answer:
-        """Release the brakes, unless an obstacle is named."""
-        return self.driver.enable(obstacle)
-
-    def brake(self) -> Answer:
-        """Put on the brakes at once."""
-        return self.driver.disable()
-
-    def clear(self) -> Answer:
-        """Clear a latched fault; the arm stays braked."""
-        return self.driver.reset_fault()
-
-    def trip(self, event: Event) -> None:
-        """Brake and latch a fault."""
-        self.driver.fault(event)
-        self.announce()
-
     def obstacle(self) -> str:
         """What speaks against a release of the brakes in the time of the arm."""
         return self.time.obstacle()
 
     @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+    def warnings(self) -> tuple[str, ...]:
         """What a person should know: what time does not begin without, else what is near a limit."""
         return (self.unready,) if self.time.start_overdue else tuple(self.driver.warnings)
 
     @property
-    def lateness(self) -> str:  # type: ignore[override]
+    def lateness(self) -> str:
         """How many periods were late and what to do about it, '' where few were."""
         return self.time.lateness
 
     @property
-    def is_paused(self) -> bool:  # type: ignore[override]
+    def is_paused(self) -> bool:
         """Whether the time of the arm is stopped."""
         return self.time.is_paused
 
@@ -134,7 +116,7 @@ class DriverNode(ArmDriver):
         return ", ".join(self.peers.absent or self.session.silent) or "the peers of the driver"
 
     @property
-    def unready(self) -> str:  # type: ignore[override]
+    def unready(self) -> str:
         """What the arm still lacks before the brakes may be released, '' where nothing."""
         return f"not connected yet: {self.awaited}; start what is missing, then enable" if self.awaited else ""
 

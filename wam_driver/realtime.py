@@ -93,7 +93,8 @@ class Realtime:
             late = {"time": due * self._timing.period, "allowed": self._watchdog}
             step = self._held_up()
             cure = "give it a processor of its own, or use lockstep"
-            self._driver.fault(fault("held_up", step=step, **late) if step else fault("driver_late", cure=cure, **late))
+            event = fault("held_up", step=step, **late) if step else fault("driver_late", cure=cure, **late)
+            self._driver.safety.trip(event)
         for left in range(min(due, most) - 1, -1, -1):
             self._driver.advance(age)
             if left == 0 or self._driver.is_outer:

@@ -1,8 +1,9 @@
 """Safety states of the driver: braked, enabled, fault.  Stop always works; a fault is latched until its reset."""
 
+from collections.abc import Callable
 from enum import Enum
 
-from wam_description.event import CAUSE, Event
+from wam_description.event import CAUSE, Event, fault
 from wam_description.event_text import sentence
 from wam_description.signals import Answer
 
@@ -20,6 +21,8 @@ class Safety:
 
     Parameters
     ----------
+    release : lets the motors follow commands from now on.
+    brake : stops the motors at once.
     held : what holds an arm that is not enabled; a real one has no brakes.
 
     Attributes
@@ -28,8 +31,10 @@ class Safety:
     events : the first fault since the last reset, and the first damage under the brakes.
     """
 
-    def __init__(self, held: str = "the brakes are on") -> None:
-        self.held = held
+    def __init__(
+        self, release: Callable[[], object], brake: Callable[[], object], held: str = "the brakes are on"
+    ) -> None:
+        self._release, self._brake, self.held = release, brake, held
         self.mode = Mode.BRAKED
         self.events: tuple[Event, ...] = ()
 
@@ -38,30 +43,35 @@ class Safety:
         """The faults in words, '' where there is none."""
         return "; then ".join(map(sentence, self.events))
 
-    @property
-    def stopped(self) -> Answer:
-        """The answer to an emergency stop, of which the fault is latched."""
-        return Answer(True, f"fault: emergency stop; {self.held}; call reset_fault, then enable")
-
     def enable(self, obstacle: str) -> Answer:
-        """Let the motors follow commands, unless `obstacle` names a reason against it."""
+        """Let the motors follow commands, unless `obstacle` names a reason against it, or they do so already."""
+        if self.mode is Mode.ENABLED:
+            return Answer(True, "enabled already: nothing has changed")
         if self.mode is Mode.FAULT:
             return Answer(False, f"refused: fault '{self.fault}' is latched; call reset_fault first, then enable")
         if obstacle:
             return Answer(False, f"refused: {obstacle}")
         self.mode = Mode.ENABLED
+        self._release()
         return Answer(True, "enabled: the motors follow the commands")
 
     def disable(self) -> Answer:
         """Brake; works in every state and keeps a latched fault."""
+        self._brake()
         if self.mode is Mode.ENABLED:
             self.mode = Mode.BRAKED
         return Answer(True, f"{self.mode.value}: currents zero; {self.held}")
 
     def trip(self, event: Event) -> None:
-        """Latch a fault; the first one is kept."""
+        """Brake and latch a fault; the first one is kept."""
         if self.mode is not Mode.FAULT:
             self.mode, self.events = Mode.FAULT, (event,)
+        self._brake()
+
+    def estop(self) -> Answer:
+        """Stop at once and latch a fault."""
+        self.trip(fault("emergency_stop"))
+        return Answer(True, f"fault: emergency stop; {self.held}; call reset_fault, then enable")
 
     def damage(self, event: Event) -> None:
         """Latch the first damage done under the brakes, after the fault that has put them on."""

@@ -227,7 +227,8 @@ class Simulation:
         if request.service == "pause":  # nobody waits for the time of a simulation
             return ""
         if request.service == "enable":
-            answer = self.driver.enable("") if request.data else self.driver.disable()
+            safety = self.driver.safety
+            answer = safety.enable("") if request.data else safety.disable()
             for synchroniser in set().union(*self._synchronisers.values()):
                 synchroniser.discard_commands(self.driver.stamp + self._timing.period_ns)
         else:

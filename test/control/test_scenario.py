@@ -362,7 +362,7 @@ def test_whoever_enables_the_arm_a_scenario_may_command_it_and_push_it_braked() 
     assert Simulation(CONFIGURATION, [ScenarioStep("on", 0.05, request="enable"), *steps]).play() == ""
     assert Simulation(CONFIGURATION, [steps[0]._replace(request="enable")]).play() == ""
     run = Simulation(CONFIGURATION, steps)
-    assert run.driver.enable("").success
+    assert run.driver.safety.enable("").success
     assert run.play() == ""
 
 
@@ -537,7 +537,10 @@ def test_only_of_a_simulated_arm_it_is_known_where_it_begins_a_real_one_is_brake
     assert len(load(path, SHARED)) == 1, "played into a stack that runs, by an arm that may be there"
     others = [name for name in SHARED.nodes if name != "driver"]
     assert len(load_for(CONFIGURATION.with_values({"nodes": others}), str(path))) == 1
-    for nodes, requests in ((SHARED.nodes, [Call("driver", "pause", True)]), (tuple(others), [Call("driver", "enable", False)])):
+    for nodes, requests in (
+        (SHARED.nodes, [Call("driver", "pause", True)]),
+        (tuple(others), [Call("driver", "enable", False)]),
+    ):
         scenario = Scenario([ScenarioStep("wait", 0.005)])
         node = ScenarioNode(replace(SHARED, nodes=nodes), ScenarioParameters(""), scenario)
         for tick in range(3):

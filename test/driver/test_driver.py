@@ -42,7 +42,7 @@ def carrying(q: np.ndarray | list[float], extra: tuple[float, ...] = (0.0,) * 4)
 
 def enabled(joints: dict[str, tuple[float, ...]] | None = None, **parameters: float) -> Driver:
     hardware = driver(joints, **parameters)
-    assert hardware.enable("").success
+    assert hardware.safety.enable("").success
     return hardware
 
 
@@ -82,19 +82,19 @@ def test_starts_braked_and_does_not_sag() -> None:
 def test_commands_are_ignored_while_braked_and_in_a_fault() -> None:
     hardware = driver()
     assert answered(hardware, 5.0) == [0.0] * 4
-    hardware.fault(fault("test", reason="test"))
+    hardware.safety.trip(fault("test", reason="test"))
     assert answered(hardware, 5.0) == [0.0] * 4
 
 
 def test_enable_discards_every_command_before_it() -> None:
     hardware = driver()
     hardware.command(hardware.stamp, [5.0] * 4)
-    hardware.enable("")
+    hardware.safety.enable("")
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
     hardware.command(hardware.stamp, [5.0] * 4)
-    hardware.disable()
-    hardware.enable("")
+    hardware.safety.disable()
+    hardware.safety.enable("")
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
     assert answered(hardware, 5.0) == [5.0] * 4
@@ -102,10 +102,10 @@ def test_enable_discards_every_command_before_it() -> None:
 
 def test_to_enable_an_enabled_driver_changes_nothing() -> None:
     hardware = driver()
-    hardware.enable("")
+    hardware.safety.enable("")
     hardware.command(hardware.stamp, [5.0] * 4)
     for _ in range(3):
-        assert hardware.enable("an obstacle").success
+        assert hardware.safety.enable("an obstacle").success
         hardware.advance(0.0)
         assert hardware.currents == [5.0] * 4, "no period without current while the brakes are off"
 
@@ -114,7 +114,7 @@ def test_answer_to_a_state_before_the_release_of_the_brakes_is_ignored_when_it_c
     hardware = driver()
     before = hardware.stamp
     hardware.advance(0.0)
-    hardware.enable("")
+    hardware.safety.enable("")
     hardware.command(before, [5.0] * 4)
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
@@ -209,7 +209,7 @@ def test_warning_ends_when_the_arm_is_braked() -> None:
         if not hardware.warnings:
             play(hardware, PERIOD, SPIN)
     assert hardware.warnings
-    hardware.disable()
+    hardware.safety.disable()
     assert hardware.warnings == []
 
 
@@ -219,21 +219,21 @@ def test_hot_motor_is_a_warning_and_reset_cools_it() -> None:
     assert any("motor4 is hot" in warning for warning in hardware.warnings)
     assert hardware.safety.mode is Mode.ENABLED
     hardware.reset()
-    hardware.enable("")
+    hardware.safety.enable("")
     play(hardware, 0.01)
     assert hardware.warnings == []
 
 
 def _braked(hardware: Driver) -> None:
-    hardware.disable()
+    hardware.safety.disable()
 
 
 def _stopped(hardware: Driver) -> None:
-    hardware.fault(fault("emergency_stop"))
+    hardware.safety.trip(fault("emergency_stop"))
 
 
 def _faulty(hardware: Driver) -> None:
-    hardware.fault(fault("test", reason="another"))
+    hardware.safety.trip(fault("test", reason="another"))
 
 
 def _running(hardware: Driver) -> None:
@@ -251,10 +251,10 @@ def test_estop_works_in_every_state(prepare: Callable[[Driver], None]) -> None:
     held = hardware.plant.theta
     play(hardware, 0.1, (20.0,) * 4)
     np.testing.assert_allclose(hardware.plant.theta, held, atol=1e-6)
-    assert not hardware.enable("").success
+    assert not hardware.safety.enable("").success
     hardware.reset_fault()
     assert hardware.safety.mode is Mode.BRAKED
-    assert hardware.enable("").success
+    assert hardware.safety.enable("").success
 
 
 def test_samples_before_a_fault_are_kept_until_it_is_reset() -> None:
@@ -314,7 +314,7 @@ def test_true_contact_is_the_greatest_load() -> None:
 
 def hardware_with_cables(parameters: DriverParameters = PARAMETERS, **cables: tuple[float, ...]) -> Driver:
     hardware = Driver(dataclasses.replace(SHARED, arm=changed(WAM, cables=cables)), parameters)
-    assert hardware.enable("").success
+    assert hardware.safety.enable("").success
     return hardware
 
 
@@ -512,7 +512,7 @@ def stopped_at_speed(q: list[float], qd: list[float], stop: Callable[[Driver], A
 
 
 @pytest.mark.parametrize(
-    ("stop", "before"), [(_stopped, "emergency stop; then "), (Driver.disable, ""), (_faulty, "another; then ")]
+    ("stop", "before"), [(_stopped, "emergency stop; then "), (_braked, ""), (_faulty, "another; then ")]
 )
 def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
     stop: Callable[[Driver], Any], before: str

@@ -35,7 +35,7 @@ def driver(configuration: Configuration = WAM, **values: Any) -> Driver:
 
 def enabled(**values: Any) -> Driver:
     hardware = driver(**values)
-    assert hardware.enable("").success
+    assert hardware.safety.enable("").success
     return hardware
 
 

@@ -121,7 +121,7 @@ class Bench:
             self.session,
             self.publish,
             self.call_the_roll,
-            self.driver.fault,
+            self.driver.safety.trip,
             self.clock,
         )
         found.start()
@@ -164,7 +164,7 @@ def test_an_answer_that_does_not_come_is_a_fault_by_name_braked_or_not(
     bench.running = running
     lockstep = bench.lockstep()
     if is_enabled:
-        bench.driver.enable("")
+        bench.driver.safety.enable("")
     begin = bench.clock.time
     while not bench.driver.safety.fault:
         bench.clock.time += DRIVER.watch
@@ -260,7 +260,7 @@ def test_a_driver_that_was_frozen_in_realtime_brakes_and_does_not_catch_up(is_en
     realtime.tick()
     realtime.take_currents(bench.driver.stamp, HOLDING)
     if is_enabled:
-        bench.driver.enable(realtime.obstacle())
+        bench.driver.safety.enable(realtime.obstacle())
     stamp = bench.driver.stamp
     bench.clock.time += 60.0
     realtime.take_currents(stamp, HOLDING)  # what came meanwhile may be taken first

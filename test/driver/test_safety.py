@@ -7,7 +7,7 @@ from wam_driver.safety import Mode, Safety
 
 
 def in_mode(mode: Mode) -> Safety:
-    safety = Safety()
+    safety = Safety(list, list)
     if mode is Mode.ENABLED:
         assert safety.enable("").success
     elif mode is Mode.FAULT:

@@ -152,7 +152,7 @@ def test_the_driver_of_a_real_arm_states_what_a_person_has_to_do_and_which_fault
     wait_for("motor controller 2 sends no position", Level.ERROR)
     console = capfd.readouterr().err
     assert "fault, only the windings of the motors brake, and the arm sinks; when its cause is gone: wam" in console
-    assert "brakes" not in console + driver.brake().message + driver.estop().message
+    assert "brakes" not in console + driver.disable().message + driver.estop().message
     assert console.rindex("Shift-Activate") < console.rindex("sends no position"), "not while a fault is latched"
 
 
@@ -238,12 +238,11 @@ class Broken:
             self.hardware.command([1.0] * 4)
         return answer
 
-    def brake(self) -> Answer:
-        return Answer(True, "braked") if self.defect == "disable" else super().brake()
+    def disable(self) -> Answer:
+        return Answer(True, "braked") if self.defect == "disable" else super().disable()
 
-    def trip(self, event: Event) -> None:
-        if self.defect != "estop":
-            super().trip(event)
+    def estop(self) -> Answer:
+        return Answer(True, "fault") if self.defect == "estop" else super().estop()
 
     def take_problem(self, problem: Event | None) -> None:
         if self.defect not in ("claims", "agreement"):

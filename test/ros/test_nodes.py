@@ -464,7 +464,7 @@ def test_two_arms_in_two_namespaces_do_not_mix(ros: Any, tmp_path: Path) -> None
         )
     drivers = {namespace: nodes["driver"].driver for namespace, nodes in arms.items()}
     ros.wait(lambda: all(len(h.seen["joint_states"]) > 20 for h in heard.values()), what="both arms")
-    assert drivers["/left"].enable("").success
+    assert drivers["/left"].safety.enable("").success
     counts = {namespace: len(h.seen["joint_states"]) for namespace, h in heard.items()}
     ros.wait(lambda: all(len(h.seen["joint_states"]) > counts[n] + 20 for n, h in heard.items()))
     assert [d.safety.mode for d in drivers.values()] == [Mode.ENABLED, Mode.BRAKED]

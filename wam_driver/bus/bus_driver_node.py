@@ -6,7 +6,7 @@ from typing import Any
 from std_srvs.srv import Trigger
 
 from wam_description.arm import Shared
-from wam_description.event import Event, fault
+from wam_description.event import fault
 from wam_description.interface import declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Answer, State
@@ -32,8 +32,8 @@ class BusDriver(ArmDriver):
             raise ParameterError("timing.mode is lockstep, which is for simulated arms; set it to realtime")
         self._watchdog = self.own.watchdog
         self.hardware: ArmBus = self.make_hardware(self.shared, self.own)
-        self.safety = Safety("only the windings of the motors brake, and the arm sinks")
-        self._take_advice()
+        held = "only the windings of the motors brake, and the arm sinks"
+        self.safety = Safety(self._release, lambda: self.hardware.brake(True), held)
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
         self.serve("confirm_home", Trigger, self._confirm_home)
@@ -71,12 +71,19 @@ class BusDriver(ArmDriver):
             self._publish(due)
         if hardware.trouble:
             self.trip(fault("hardware", reason=str(hardware.trouble)))
-        self._take_advice()
         self.announce()
 
-    def _take_advice(self) -> None:
-        self.advice = self.unready = advice = self.hardware.advice
-        self.warnings = (advice,) if advice else ()
+    @property
+    def advice(self) -> str:
+        """What a person has to do."""
+        return self.hardware.advice
+
+    unready = advice
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The same, where there is something to do."""
+        return (self.advice,) if self.advice else ()
 
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
@@ -110,29 +117,14 @@ class BusDriver(ArmDriver):
             else "no motor_current_command arrives; start velocity_loop, then enable"
         )
 
-    def release(self, obstacle: str) -> Answer:
-        """Release the motors, unless an obstacle is named."""
-        answer = self.safety.enable(obstacle)
-        if answer.success:
-            self._command_stamp = self.stamp
-            self.hardware.brake(False)
-        return answer
+    def _release(self) -> None:
+        self._command_stamp = self.stamp
+        self.hardware.brake(False)
 
-    def brake(self) -> Answer:
-        """Brake now, not in the next period."""
-        self.hardware.brake(True)
-        return self.safety.disable()
-
-    def clear(self) -> Answer:
+    def reset_fault(self) -> Answer:
         """Clear a latched fault; the motors stay braked."""
         self.hardware.clear()
-        return self.safety.reset_fault()
-
-    def trip(self, event: Event) -> None:
-        """Brake and latch a fault."""
-        self.safety.trip(event)
-        self.hardware.brake(True)
-        self.announce()
+        return super().reset_fault()
 
     def estop(self) -> Answer:
         """Stop as safely as the hardware can, and latch a fault."""

@@ -117,7 +117,7 @@ def play(
     """
     shared = configuration.shared
     driver = Driver(shared, configuration.node("driver", DriverParameters))
-    driver.enable("")
+    driver.safety.enable("")
     period, matrix = shared.timing.period, TransmissionMap.of(shared.arm).joint_from_motor
     k_p, k_i = (np.array(gain) for gain in (shared.servo.proportional_gain, shared.servo.integral_gain))
     body, inverse = RigidBody(shared.model_arm), np.linalg.inv(matrix)
