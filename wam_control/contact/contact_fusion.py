@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.thresholds import CONTACT
-from wam_description.small_matrices import inverse, solution, solutions
+from wam_description.small_matrices import inverse
 
 Array = NDArray[np.float64]
 
@@ -174,7 +174,7 @@ class ContactFusion:
         sides, slopes = _sides(rows[:found, :, -1:], places)
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
-        forces = solutions(levers, present @ last.residual)  # (links, 3), N
+        forces = np.linalg.solve(levers, (present @ last.residual)[..., None])[..., 0]  # (links, 3), N
         moved = CONTACT.slip * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
         elapsed = np.array([now.time + CONTACT.moves_on - moment.torques.time for moment in moments])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
@@ -235,7 +235,7 @@ def _sides(rows: Array, places: Array) -> tuple[Array, Array]:
 
 def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
     """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
-    weighted = solution(covariance + slips.T @ slips, before)
+    weighted = np.linalg.solve(covariance + slips.T @ slips, before)
     return float(torques.dot(weighted)) / float(before.dot(weighted))
 
 
@@ -248,7 +248,7 @@ def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> flo
     covariance : (m, m), N^2 m^2, if it does not slide, whatever its force and position.
     slide : (m,), N m, torques of the standard deviation of its speed.
     """
-    weighted = solution(covariance, slide)
+    weighted = np.linalg.solve(covariance, slide)
     gain = float(slide.dot(weighted))
     evidence = 0.5 * (float(torques.dot(weighted)) ** 2 / (1.0 + gain) - math.log1p(gain))
     odds = (

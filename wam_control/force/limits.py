@@ -14,7 +14,6 @@ from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
 from wam_description.rigid_body import RigidBody
-from wam_description.small_matrices import largest_eigenvalue
 
 Array = NDArray[np.float64]
 
@@ -138,7 +137,7 @@ class WorldPush(NamedTuple):
     @classmethod
     def at(cls, torques: Array, size: float, jacobian: Array) -> "WorldPush":
         """What pushes with these torques (n,), N m, of this certain size at a point with this Jacobian (3, n)."""
-        lever = max(math.sqrt(largest_eigenvalue(jacobian @ jacobian.T)), FORCE.least_lever)
+        lever = max(math.sqrt(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]), FORCE.least_lever)
         return cls(size / lever, torques, lever)
 
     def row(self, allowed: float, gain: float, fastest: float) -> VelocityRow:

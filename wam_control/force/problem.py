@@ -16,7 +16,7 @@ import quadprog
 from numpy.typing import NDArray
 
 from wam_control.force.thresholds import FORCE
-from wam_description.small_matrices import inverse, solution
+from wam_description.small_matrices import inverse
 
 Array = NDArray[np.float64]
 RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
@@ -64,7 +64,7 @@ def solve(
         along, speed = rows[0]
         unlimited = posture + along * ((speed - along.dot(posture)) / along.dot(along))
     elif rows:
-        unlimited = solution(*_normal(rows, posture))
+        unlimited = np.linalg.solve(*_normal(rows, posture))
     else:
         unlimited = posture
     broken = [row for row in least if row.size > FORCE.shortest_lever]
