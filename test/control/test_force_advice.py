@@ -9,6 +9,7 @@ from numpy import eye
 from test_force_loop import ARM, BODY, DRIVEN, DT, STILL, force_loop
 from test_held_arm import OWN
 
+from wam_control.force.force_loop import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.event import Code, Event
 from wam_description.signals import NO_CONTACT, ForceCommand, State
@@ -37,7 +38,7 @@ def asked(own: ForceLoopParameters, q: Sequence[float], frame: str, force: tuple
     x, y, z = force
     for _ in range(LONG):
         command = ForceCommand(frame, (x, y, z))
-        loop.step(joints, sensors, NO_CONTACT, STILL, command, None, None, DT, external_sd=[sd] * 4 if sd else None)
+        loop.step(ForceInput(joints, DT, sensors, NO_CONTACT, STILL, [sd] * 4 if sd else None, command))
     return loop.event
 
 

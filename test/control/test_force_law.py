@@ -8,7 +8,7 @@ import pytest
 from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
 from wam_control.force.force_law import ForceLaw
-from wam_control.force.force_loop import ForceCommand, ForceOutput
+from wam_control.force.force_loop import ForceCommand, ForceInput, ForceOutput
 from wam_description.event import refused
 from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
@@ -144,7 +144,7 @@ def measured_across(torque: list[float]) -> ForceOutput:
         ask(loop, World(400.0, force=9.0), down(9.5))
     world = World(400.0, force=3.0)
     command = ForceCommand("base", down(9.5))
-    return loop.step(State(POSE, STILL, torque), world.sensors, NO_CONTACT, None, command, None, None, DT)
+    return loop.step(ForceInput(State(POSE, STILL, torque), DT, world.sensors, NO_CONTACT, command=command))
 
 
 @pytest.mark.slow
@@ -161,7 +161,7 @@ def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
     moved = [0.3, -1.0, 0.4, 0.9]
 
     def hold(q: list[float], effort: list[float]) -> list[float]:
-        return loop.step(State(q, STILL, effort), None, NO_CONTACT, None, None, None, None, DT).velocity
+        return loop.step(ForceInput(State(q, STILL, effort), DT, contact=NO_CONTACT)).velocity
 
     hold(POSE, DRIVEN)
     assert max(map(abs, hold(moved, DRIVEN))) > 0.5, "driven, the arm goes back to where it started"

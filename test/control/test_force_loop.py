@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.force.force_loop import ForceCommand, ForceInput, ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task.motion import GoalMotion
 from wam_description.arm import Arm
@@ -101,8 +101,8 @@ def ask(loop: ForceLoop, world: World, force: Any = None, dt: float = DT, **more
     """One period with a force, N, downwards if it is a number, and what else `ForceLoop.step` takes, by its names."""
     x, y, z = down(force) if isinstance(force, float) else force or (0.0, 0.0, 0.0)
     command = None if force is None else ForceCommand("base", (float(x), float(y), float(z)))
-    given = {"contact": NO_CONTACT, "external": None, "command": command, "posture": None, "torque": None, **more}
-    return loop.step(**{"joints": world.joints, "sensors": world.sensors, **given, "dt": dt})
+    given = {"joints": world.joints, "sensors": world.sensors, "contact": NO_CONTACT, "command": command}
+    return loop.step(ForceInput(dt=dt, **(given | more)))
 
 
 def moved(loop: ForceLoop, world: World, force: float | None = None, periods: int = 1, **more: Any) -> ForceOutput:
@@ -361,7 +361,7 @@ def test_a_posture_that_moves_faster_than_the_arm_may_is_reported(speed: float, 
     loop, world = force_loop(ARM, replace(OWN, joint_speed_limit=0.5)), World(1e-9)
     for k in range(200):
         rate = [0.5 * speed, 0.0, 0.0, 0.0]
-        moved(loop, world, posture=[POSE[0] + rate[0] * DT * k, *POSE[1:]], posture_rate=rate)
+        moved(loop, world, posture=[POSE[0] + rate[0] * DT * k, *POSE[1:]], rate=rate)
         assert loop.event.code is code
 
 

@@ -12,7 +12,7 @@ from test_force_loop import ARM, BODY, CONFIGURATION, DRIVEN, DT, POSE, STILL, d
 
 from wam_control.force.belief import WorldTorques
 from wam_control.force.force_axis import ForceAxes
-from wam_control.force.force_loop import ForceLoop
+from wam_control.force.force_loop import ForceInput, ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.held_arm import PushedArm
 from wam_description.event import Code
@@ -50,7 +50,7 @@ class Pushed:
             sensors = State(self.q, STILL, (BODY.gravity_torque(self.q) - torques).tolist())
             command = ForceCommand("base", self.force) if any(self.force) else None
             joints = State(self.q, STILL, DRIVEN)
-            out = self.loop.step(joints, sensors, NO_CONTACT, None, command, None, None, DT)
+            out = self.loop.step(ForceInput(joints, DT, sensors, NO_CONTACT, command=command))
             self.codes |= {event.code for event in self.loop.events}
             self.q = [a + v * DT for a, v in zip(self.q, out.velocity, strict=True)]
 

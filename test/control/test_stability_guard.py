@@ -11,7 +11,7 @@ import pytest
 from arms import BODY, LEVER, changed, one_joint
 
 from wam_control.force.contact_place import anywhere_sd
-from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
+from wam_control.force.force_loop import ForceCommand, ForceInput, ForceLoop, ForceLoopParameters
 from wam_control.force.force_loop_parameters import task_of
 from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
 from wam_control.force.sampled_loop import Feedback
@@ -166,7 +166,7 @@ def test_gains_of_joint_torques_are_taken_down_before_the_arm_moves(gain: float,
     state, free = State(q, [0.0] * 4, [1.0] * 4), State(q, [0.0] * 4, BODY.gravity_torque(q).tolist())
     loop = Loop(replace(OWN, torque_gain=(gain,), torque_error_limit=(1e3,), limits=FREE))
     while not any(velocity):
-        velocity = loop.step(state, free, NO_CONTACT, None, None, None, [0.0, 1.0, 0.0, 0.0], 0.005).velocity
+        velocity = loop.step(ForceInput(state, 0.005, free, NO_CONTACT, torque=[0.0, 1.0, 0.0, 0.0])).velocity
     assert loop.watch is not None
     assert loop.watch.assessed
     assert (loop.watch.factor < 0.3) is is_lowered
@@ -271,16 +271,8 @@ def follow(
     state = State(list(q), [0.0] * len(q), [1.0] * len(q))
     cover = loop.parameters.contact_cover
     for _ in range(periods):
-        loop.step(
-            state,
-            state,
-            contact,
-            [0.0] * len(q),
-            ForceCommand(cover, force),
-            None,
-            None,
-            0.005,
-        )
+        command = ForceCommand(cover, force)
+        loop.step(ForceInput(state, 0.005, state, contact, [0.0] * len(q), command=command))
     assert loop.watch is not None
     return loop.watch.factor
 
@@ -340,7 +332,7 @@ def test_the_velocity_obeys_the_factor() -> None:
     state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, 0.0, -6.0))
     speeds = []
     for _ in range(300):
-        out = loop.step(state, state, NO_CONTACT, None, command, list(STIFF_POSE), None, 0.005)
+        out = loop.step(ForceInput(state, 0.005, state, NO_CONTACT, command=command, posture=list(STIFF_POSE)))
         speeds.append(float(np.linalg.norm(out.velocity)) / abs(out.error[2]))
     assert loop.watch is not None
     assert loop.watch.factor < 0.75

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from arms import BODY, CONFIGURATION, SHARED, WAM
 
-from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.force.force_loop import ForceInput, ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.force.force_loop_parameters import sensing_of
 from wam_control.force.force_loop_parameters import task_of as task_of_parameters
 from wam_control.force.stability_guard import GuardedForces, GuardedTask, StabilityGuard
@@ -74,7 +74,8 @@ class Springs:
             q = self.q.tolist()
             sensors = State(q, REST, (BODY.gravity_torque(q) + torque).tolist())
             joints, contact = State(q, REST, [1.0] * 4), more.get("contact", NO_CONTACT)
-            out = self.loop.step(joints, sensors, contact, None, None, more.get("posture"), None, DT, task)
+            given = ForceInput(joints, DT, sensors, contact, posture=more.get("posture"), task=task)
+            out = self.loop.step(given)
             self.q = self.q + DT * np.array(out.velocity)
         return out
 
@@ -217,7 +218,7 @@ def test_a_force_from_torques_that_are_known_badly_is_refused(sd: float, is_know
     contact = Contact(COVER, PLACE, (0.0, 0.0, 5.0), 0.001, 1.0, 0.1)
     external, task = (-5.0 * lever).tolist(), base(force(5.0))
     for _ in range(50):
-        world.loop.step(still, None, contact, external, None, None, None, DT, task, external_sd=[sd] * 4)
+        world.loop.step(ForceInput(still, DT, None, contact, external, [sd] * 4, task=task))
     assert (world.loop.event.code is Code.NONE) is is_known
     assert world.loop.event.values.get("part", "torques") == "torques"
 
@@ -280,7 +281,7 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
         contact = Contact(COVER, PLACE, (0.0, 0.0, touched), 0.001, 1.0, 0.1) if touched else NO_CONTACT
         for _ in range(300):
             external = (-touched * lever).tolist()
-            out = world.loop.step(still, None, contact, external, None, None, None, DT, base(force(10.0)))
+            out = world.loop.step(ForceInput(still, DT, None, contact, external, task=base(force(10.0))))
             wound = wound or (out.known[0].force if any(out.effort) else 0.0)
         assert out.effort == pytest.approx((share * 10.0 - wound) * lever, rel=1e-2)
     assert 2.0 <= wound < 4.0
@@ -403,7 +404,7 @@ def test_a_task_that_ends_leaves_the_arm_where_it_is() -> None:
 
 def test_a_task_without_sensors_is_not_done() -> None:
     loop = ForceLoop(WAM, SHARED.servo, OWN, SHARED.timing)
-    out = loop.step(State(POSE, REST, [1.0] * 4), None, None, None, None, None, None, DT, base(force(5.0)))
+    out = loop.step(ForceInput(State(POSE, REST, [1.0] * 4), DT, task=base(force(5.0))))
     assert out.rows == ()
     assert out.velocity == pytest.approx(REST)
 

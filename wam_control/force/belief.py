@@ -6,7 +6,7 @@ that shakes.  Its size per tolerated error is the doubt of a command.
 """
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,9 @@ class Belief(NamedTuple):
     def doubt(self) -> float:
         """Predicted error per tolerated error."""
         return self.errors.size / self.tolerance if self.tolerance else math.inf
+
+
+UNKNOWN: Final = Belief(0.0, 0.0, math.inf, 0.0, Errors(torques=math.inf), 0.0)
 
 
 class WorldTorques(NamedTuple):

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from wam_control.force.advice import Ways
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.belief import Belief, WorldTorques, belief
+from wam_control.force.belief import UNKNOWN
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, Phasors
-from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
@@ -33,7 +33,7 @@ class AxisRun:
 
     Attributes
     ----------
-    now, known : the axis in the present period, and what is known of its force.
+    now, known : the axis in the present period, set as the period begins, and what is known of its force.
     place : where its force acts.
     watch, motion : what is reported of its force, or of its motion.
     anchor : position to hold where none is commanded, m or rad.
@@ -44,7 +44,7 @@ class AxisRun:
 
     def __init__(self, of: TaskAxis, covers: Covers) -> None:
         self.now: CommandedAxis
-        self.known: Belief
+        self.known = UNKNOWN
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
         self.anchor, self.wound, self.side, self.is_kept = math.nan, math.nan, 1.0, False
@@ -200,17 +200,6 @@ class CommandRun:
             if force <= 0.0 or forces.axis(q, pressed).unexplained(torques) > FORCE.unexplained:
                 return
         self.resting = np.zeros_like(torques)
-
-    def believe(self, axis: CommandedAxis, torques: WorldTorques, own: ForceLoopParameters) -> Belief:
-        """What is known of the force along an axis, N."""
-        size = abs(axis.desired)
-        if axis.is_joint:  # the torques of the joints are one vector
-            size = math.hypot(*(one.now.desired for one in self.axes if one.now.is_joint))
-        if own.is_estimated and axis.sensed is not None and not self.is_touching:
-            # it will press at rest: on the way there, the friction of the moving motors is less certain
-            pressed = sensing_of(own).torque_fraction * axis.desired * axis.sensed.press
-            torques = torques._replace(sd=np.hypot(self.still_sd, pressed))
-        return belief(axis, size, torques, own, self.is_touching, self.resting, self.shaking.swing(axis, own))
 
     def move(self, moved: Array, forces: ForceAxes, q: Sequence[float]) -> None:
         """Count a motion of the joints (n,), rad: what is touched stays, and the link slides along it."""

@@ -227,10 +227,14 @@ class ForceAxes:
         friction = self._parameters.friction * size * _across(direction, direction)
         return [size * direction @ jacobian, *(friction @ jacobian), position_sd * size * direction @ slide]
 
+    def link_axis(self, q: Sequence[float], cover: str) -> Array:
+        """Direction (3,) along a cover, base frame."""
+        return self._body.cover_pose(q, cover).rotation[:, 0]
+
     def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
         point = (position, *self.covers.aside(cover, position))
-        along = self._body.cover_pose(q, cover).rotation[:, 0]
+        along = self.link_axis(q, cover)
         return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
@@ -247,7 +251,7 @@ class ForceAxes:
         to the normal of the link's side, the link slides, and the force turns to the normal; beyond `least_normal` only
         what holds the link gives such a force.
         """
-        along = self._body.cover_pose(q, cover).rotation[:, 0]
+        along = self.link_axis(q, cover)
         aside = along * float(along @ direction)
         across: Array = direction - aside
         size, most = float(np.linalg.norm(across)), self._parameters.friction

@@ -19,7 +19,7 @@ from wam_control.force.advice import tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief, WorldTorques
 from wam_control.force.command_run import AxisRun, CommandRun
-from wam_control.force.contact_place import STEEPEST, ContactPlace, ForcePlace, pinned_position
+from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, Commands, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
@@ -28,6 +28,7 @@ from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
+from wam_control.force.knowledge import Knowledge
 from wam_control.force.limits import (
     accelerated,
     approach_speed,
@@ -48,10 +49,43 @@ from wam_description.event import OBEYED, Code, Event, holding, warning
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
 
-__all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
+__all__ = ["ForceCommand", "ForceInput", "ForceLoop", "ForceLoopParameters", "ForceOutput", "by_seriousness"]
 
 Array = NDArray[np.float64]
 AxisRow = tuple[float, float, float, float, float]  # under TASK_AXIS_COLUMNS
+
+
+class ForceInput(NamedTuple):
+    """What the force loop is given in one outer period; None is what nobody gives.
+
+    Attributes
+    ----------
+    joints : joint state from the motors.  Where no motor gives any torque they are braked or in fault: all controller
+        state is reset then.
+    dt : outer period, s.
+    sensors : joint-side sensors.
+    contact : estimated contact, force of the world on the cover.  Without the signals that `feedback` names neither
+        force nor joint torque is controlled.
+    external, external_sd : estimated torques of the world on the joints (n,), N m, and their standard deviations.
+    command : commanded force; None or zero leaves all axes to the posture.  Where a force ends with None, the arm
+        stays where it is.
+    posture : commanded joint angles (n,), rad; None holds those of the start, or those where a posture ended.
+    rate : velocity at which the commanded posture moves (n,), rad/s.
+    torque : commanded joint torques on the world (n,), N m: a task with an axis for each joint.
+    task : takes the place of force and torque; where it ends, the arm stays where it is.
+    """
+
+    joints: State
+    dt: float
+    sensors: State | None = None
+    contact: Contact | None = None
+    external: Sequence[float] | None = None
+    external_sd: Sequence[float] | None = None
+    command: ForceCommand | None = None
+    posture: Sequence[float] | None = None
+    rate: Sequence[float] | None = None
+    torque: Sequence[float] | None = None
+    task: TaskCommand | None = None
 
 
 class ForceOutput(NamedTuple):
@@ -185,79 +219,55 @@ class ForceLoop:
         at = self._pressed_at
         return at is None or bool(np.abs(at - np.array(self._q)).max() > MOTION.left_angle)
 
-    def step(
-        self,
-        joints: State,
-        sensors: State | None,
-        contact: Contact | None,
-        external: Sequence[float] | None,
-        command: ForceCommand | None,
-        posture: Sequence[float] | None,
-        torque: Sequence[float] | None,
-        dt: float,
-        task: TaskCommand | None = None,
-        posture_rate: Sequence[float] | None = None,
-        external_sd: Sequence[float] | None = None,
-    ) -> ForceOutput:
-        """One outer period.
-
-        Parameters
-        ----------
-        joints : joint state from the motors.  Where no motor gives any torque they are braked or in
-            fault: all controller state is reset then.
-        sensors : joint-side sensors, None where there are none.
-        contact : estimated contact, force of the world on the cover; None where nobody estimates it.  Without
-            the signals that `feedback` names neither force nor joint torque is controlled.
-        external : estimated torques of the world on the joints (n,), N m.
-        command : commanded force; None or zero leaves all axes to the posture.  Where a force ends with None, the arm
-            stays where it is.
-        posture : commanded joint angles (n,), rad; None holds those of the start, or those where a posture ended.
-        torque : commanded joint torques on the world (n,), N m: a task with an axis for each joint.
-        dt : outer period, s.
-        task : takes the place of force and torque; where it ends, the arm stays where it is.
-        posture_rate : velocity at which the commanded posture moves (n,), rad/s.
-        external_sd : standard deviations of `external` (n,), N m; None where they are not published.
-        """
-        own, q = self.parameters, joints.position
+    def step(self, given: ForceInput) -> ForceOutput:
+        """One outer period: the axes of what is commanded, then what is known of them, then the motion, then events."""
+        own, joints, dt = self.parameters, given.joints, given.dt
         is_braked, is_first = not any(joints.effort), not self._q
-        self._q = list(q)
+        self._q = list(joints.position)
         if is_braked or is_first:
             self._reset()
-        if (contact if own.is_estimated else sensors) is None:
-            task = None
-            if own.mode != "open_loop":
-                command = torque = None  # a force that is not measured would grow without bounds
-        is_free, contact = contact is not None and not contact.cover, contact or NO_CONTACT
+        given = self._measurable(given)
+        contact = given.contact or NO_CONTACT
         is_touched = bool(contact.cover) or self._run.is_touching
-        self._measurement.step(own, joints, sensors, external, external_sd, is_touched, dt)
-        topic = "force_command" if task is None else "task_command"
-        if task is None and torque is not None and own.mode != "open_loop":
-            topic, task, torque = "joint_torque_command", TaskCommand(BASE, joint_axes(AxisKind.FORCE, torque)), None
-        if task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
-            self._admission.restart(q)  # the arm stays where it is
-        commands = self._admission.step(own, q, command, posture, torque, dt, task)
+        self._measurement.step(own, joints, given.sensors, given.external, given.external_sd, is_touched, dt)
+        topic = "force_command" if given.task is None else "task_command"
+        if given.task is None and given.torque is not None and own.mode != "open_loop":
+            topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
+            given = given._replace(task=TaskCommand(BASE, torques), torque=None)
+        if given.task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
+            self._admission.restart(self._q)  # the arm stays where it is
+        commands = self._admission.step(own, self._q, given.command, given.posture, given.torque, dt, given.task)
         self.refusals = commands.refusals
-        done, key = _task(commands, task, own)
+        task, key = _task(commands, given.task, own)
         if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
-            self._begin(done, key, is_free)
-        self._find_axes(done, contact)
-        frame = done.frame if done else BASE
-        if own.mode == "open_loop" and task is None:
-            effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(q)))
+            self._begin(task, key, given.contact is not None and not contact.cover)
+        self._find_axes(task, contact)
+        frame = task.frame if task else BASE
+        if own.mode == "open_loop" and given.task is None:
+            effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(self._q)))
             self.events = ()
             return ForceOutput([], effort.tolist(), frame=frame)
-        rate = posture_rate if posture_rate and commands.posture == posture else None
+        rate = given.rate if given.rate and commands.posture == given.posture else None
         found = self._watch(contact, rate is not None, dt)
-        if task is not None and (reason := beyond(task, own)):
+        if given.task is not None and (reason := beyond(given.task, own)):
             found.append(holding(Code.REFUSED, "task", reason=reason))
         velocity, fed, limits = self._move(found, contact, commands.posture, rate, is_braked, dt)
         found += limits
-        found += self._watch_motions(found, commands.posture if posture is not None else None, rate, dt)
-        self.events = _by_seriousness(self._advised(found, done))
+        found += self._watch_motions(found, commands.posture if given.posture is not None else None, rate, dt)
+        self.events = by_seriousness(self._advised(found, task))
         if self.event.holds:
             self.refusals[topic] = self.event
         self._velocity = velocity
-        return self._output(velocity, fed, frame, bool(task))
+        return self._output(velocity, fed, frame, given.task is not None)
+
+    def _measurable(self, given: ForceInput) -> ForceInput:
+        """Without the signals that are fed back, a force would grow without bounds."""
+        own = self.parameters
+        if (given.contact if own.is_estimated else given.sensors) is not None:
+            return given
+        if own.mode == "open_loop":
+            return given._replace(task=None)
+        return given._replace(task=None, command=None, torque=None)
 
     def _reset(self) -> None:
         """Hold this posture and forget what was before."""
@@ -311,7 +321,7 @@ class ForceLoop:
         run.before = q
         run.judge(self._q, self._measurement, forces)
         for one in run.axes:
-            one.known = self._doubting(one.now, self._believe(self._q, one.now), contact)
+            one.known = self._knowledge.of(self._q, one.now, contact)
         run.move(moved, forces, self._q)
         found: list[Event] = []
         if run.is_moving:
@@ -335,35 +345,9 @@ class ForceLoop:
             run.free_at = q
         return found
 
-    def _doubting(self, axis: CommandedAxis, known: Belief, contact: Contact) -> Belief:
-        """The same where it is not known which link is touched: the force on another one may be meant, too."""
-        place, forces, q = axis.place, self._axes.forces, self._q
-        is_sure = not contact.cover or contact.probability >= self.parameters.link_probability_limit
-        if place is None or place.is_pinned or place.is_known or is_sure:
-            return known
-        covers, apart = forces.covers, 0.0
-        for name, length in zip(covers.names, covers.length, strict=True):
-            if name != place.cover:
-                other = place._replace(cover=name, position=FORCE.middle * length)
-                there = axis._replace(sensed=forces.axis(q, other.pressed(axis.direction, axis.desired)))
-                apart = max(apart, abs(there.force(self._measurement.torques.now) - known.force))
-        apart *= math.sqrt(contact.probability * (1.0 - contact.probability))  # sd of one of two forces
-        return known._replace(errors=known.errors._replace(place=math.hypot(known.errors.place, apart)))
-
-    def _believe(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
-        """What is known in a pose of the force along an axis."""
-        own, torques, place = self.parameters, self._measurement.torques, axis.place
-        known = self._run.believe(axis, torques, own)
-        if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
-            return known
-        along = self._body.cover_pose(q, place.cover).rotation[:, 0]
-        if abs(float(axis.direction @ along)) > math.sin(STEEPEST):
-            return known  # nor will it be known
-        # what is touched shows where, and the better the harder it is pressed: it is decided for the whole force
-        sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
-        place = place._replace(position_sd=max(sd, own.contact_position_sd))
-        touched = axis._replace(sensed=self._axes.forces.axis(q, place.pressed(axis.direction, axis.desired)))
-        return known._replace(errors=self._run.believe(touched, torques, own).errors)
+    @property
+    def _knowledge(self) -> Knowledge:
+        return Knowledge(self._run, self._measurement.torques, self._axes.forces, self.parameters)
 
     def _move(
         self,
@@ -589,7 +573,13 @@ class ForceLoop:
             run.search, run.ways = None, {}
             return found
         run.search = run.search or tries(
-            self._q, task, place, self._axes, self._body.arm.joints, self._believe, self.parameters
+            self._q,
+            task,
+            place,
+            self._axes,
+            self._body.arm.joints,
+            lambda pose, axis: self._knowledge.whole(pose, axis),  # noqa: PLW0108
+            self.parameters,
         )
         for ways in islice(run.search, FORCE.each):
             run.ways |= ways
@@ -635,7 +625,7 @@ def _task(commands: Commands, task: TaskCommand | None, own: ForceLoopParameters
     return TaskCommand(force.frame, (axis,)), (ForceCommand, force.frame)
 
 
-def _by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
+def by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
     """One event of each subject, those that stop the arm first, then in the order of the codes."""
     each = {event.subject: event for event in found}
     return tuple(sorted(each.values(), key=lambda event: (not event.holds, event.code.number)))

@@ -4,12 +4,12 @@ import math
 from typing import Any
 
 from wam_control.contact.contact_table import contact_of
-from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.force.force_loop import ForceInput, ForceLoop, ForceLoopParameters, ForceOutput, by_seriousness
 from wam_control.force.guard import Report
 from wam_control.force.task import TaskCommand, task_of
 from wam_control.task.trajectory_goal import TrajectoryPlayer
 from wam_description.arm import Shared
-from wam_description.event import OBEYED, Code, Event, Level, refused
+from wam_description.event import OBEYED, Event, Level, refused
 from wam_description.event_text import sentences
 from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
@@ -76,19 +76,20 @@ class ForceLoopNode:
             command = posture = torque = None  # the arm holds its position
         external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
         torque_sd = inputs["external_joint_torques_sd"]
-        out = self._loop.step(
+        given = ForceInput(
             joints,
-            inputs["joint_sensors"],
-            contact_of(hypotheses, self._covers) if external and hypotheses else None,
-            external.effort if external else None,
-            ForceCommand(command.frame, command.force, command.torque) if command else None,
-            posture.position if posture else None,
-            torque.effort if torque else None,
             inputs.dt,
-            task,
-            posture.velocity if posture else None,
-            torque_sd.effort if torque_sd else None,
+            sensors=inputs["joint_sensors"],
+            contact=contact_of(hypotheses, self._covers) if external and hypotheses else None,
+            external=external.effort if external else None,
+            external_sd=torque_sd.effort if torque_sd else None,
+            command=ForceCommand(command.frame, command.force, command.torque) if command else None,
+            posture=posture.position if posture else None,
+            rate=posture.velocity if posture else None,
+            torque=torque.effort if torque else None,
+            task=task,
         )
+        out = self._loop.step(given)
         return {
             "joint_velocity_command": State([], out.velocity, []),
             "joint_effort_command": State([], [], out.effort),
@@ -161,16 +162,16 @@ class ForceLoopNode:
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             unit = " N" if command and not (torque or task) else ""
             commanded = f"; commanded: {', '.join(map(brief, values))}{unit}" if values else ""
-        subjects = tuple(event.subject for event in (*events, *refusals.values()))
-        present = report, subjects, self._loop.is_advised, commanded
+        events = by_seriousness([*events, *refusals.values()])
+        level = Level.WARN if report.is_warning or events else Level.OK
+        facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
+        # the numbers of an event change in every period
+        subjects = tuple(event.subject for event in events)
+        present = level, report.message, facts, subjects, self._loop.is_advised, commanded
         if present == self._reported:
             return {}
         self._reported = present
-        found = {event.subject: event for event in (*events, *refusals.values())}
-        events = tuple(sorted(found.values(), key=lambda event: (not event.holds, event.code is not Code.REFUSED)))
-        level = Level.WARN if report.is_warning or events else Level.OK
         message = sentences(events) + commanded or report.message
-        facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
         return {"status": NodeStatus(level, message, facts=facts, events=events)}
 
     @property
