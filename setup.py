@@ -38,6 +38,7 @@ COMPILED = (
     "wam_control/force/force_measurement.py",
     "wam_control/force/force_watch.py",
     "wam_control/force/held_arm.py",
+    "wam_control/force/knowledge.py",
     "wam_control/force/limits.py",
     "wam_control/force/problem.py",
     "wam_control/contact/model_errors.py",

@@ -1,7 +1,7 @@
 """Monte Carlo validation of the stability guard: random parameter sets, its verdicts, and simulated responses.
 
 Two references that the guard does not use: the exact integrator, with steps and initial velocities of its own, for
-`wam_control.force.friction_verdict`; and the testbed in MuJoCo, driver and velocity loop included, for
+`wam_theory.friction_verdict`; and the testbed in MuJoCo, driver and velocity loop included, for
 `wam_control.force.stability_guard`.
 """
 
@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
-from wam_control.force.friction_verdict import friction_verdict, linear_margin, stiction_cycle
 from wam_control.force.stability_guard import GuardAssessment
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
@@ -22,6 +21,7 @@ from wam_description.parameters import parameter
 from wam_sim.simulation import Simulation
 from wam_studies.harness import Study
 from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, grouped, percent, share
+from wam_theory.friction_verdict import friction_verdict, linear_margin, stiction_cycle
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 
 RESTS, CYCLES, DIVERGES = "rests", "cycles", "diverges"

@@ -15,7 +15,10 @@ backlash_cycle       2.2: the limit cycle of backlash in a torque loop
 quantisation         3.2.1: force feedback that is read in steps
 stick_slip           exact simulation of a node (friction_model, phases, slip_arc, verdicts)
 stability_map        figure 5.8 for many nodes at once (many_slips)
+friction_verdict     domain, stable error and limit cycle of one friction node, chapter 5
+loop_design          chapter 5 for a force loop of your own
 cable                chapter 6: stiffness, slack, tension, loss and creep of stages
 tension_element      chapter 6: power and speed across pulleys
 arguments            checks of arguments
+rounding             numbers that are advised
 """

@@ -13,7 +13,6 @@ from arms import BODY, LEVER, changed, one_joint
 from wam_control.force.contact_place import anywhere_sd
 from wam_control.force.force_loop import ForceCommand, ForceInput, ForceLoop, ForceLoopParameters
 from wam_control.force.force_loop_parameters import task_of
-from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
 from wam_control.force.sampled_loop import Feedback
 from wam_control.force.stability_guard import GuardedContact, GuardedForces, GuardedTask, StabilityGuard
 from wam_control.velocity.servo_guard import ServoGuard
@@ -23,6 +22,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_studies.guard_validation import DIVERGES, GuardStudy, validate
+from wam_theory.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))

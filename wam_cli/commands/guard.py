@@ -4,11 +4,11 @@ import argparse
 import math
 
 from wam_cli.options import BASE_CONFIGURATION, PICTURE, configuration_of, take_configuration
-from wam_control.force.loop_design import loop_design
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
 from wam_stack import guard
 from wam_studies.figures.map_picture import draw
+from wam_theory.loop_design import loop_design
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 PLANT = {  # option: what it is

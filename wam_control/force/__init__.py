@@ -15,12 +15,11 @@
 ``force_loop_parameters``  its parameters
 ``force_measurement``      the external torques, by the feedback that is chosen; low pass
 ``force_watch``            the six events, each by a condition that lasts
-``friction_verdict``       domain, stable error and limit cycle of one friction node, chapter 5
 ``guard``                  admits a parameter set, scales its gains while the arm moves, reports
 ``guarded``                what is controlled, as the guard sees it
 ``held_arm``               an arm that is pushed
+``knowledge``              what is known of each force of a command in a period
 ``limits``                 what bounds the motion
-``loop_design``            the guard's model for a force loop of your own
 ``problem``                joint velocities of one period: least squares with limits
 ``sampled_loop``           arm, velocity loop and force loop as one linear map from sample to sample
 ``stability_guard``        domain, margin and largest saturation of a parameter set on the arm

@@ -6,7 +6,6 @@ of parameters can diverge, whatever the friction (domain I).  Above it, friction
 the loop for small errors (domain II); the guard does not rely on that.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,13 +17,15 @@ from numpy.typing import NDArray
 
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force.force_law import ForceLaw
-from wam_control.force.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
 from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter
+from wam_theory.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_theory.linear_loop import series_stiffness
+from wam_theory.rounding import rounded_down
 from wam_theory.stick_slip import FrictionNode
+from wam_theory.thresholds import DESIGN
 
 Array = NDArray[np.float64]
 ESTIMATE = "contact_estimate"
@@ -321,7 +322,7 @@ class StabilityGuard:
 
     def _parts(self, task: GuardedTask) -> tuple[float, ...]:
         """Fractions of the stiffness to consider; a known spring has its own alone."""
-        return GUARD.softer[:1] if task.feedback.kind == "joint_position" else GUARD.softer
+        return DESIGN.softer[:1] if task.feedback.kind == "joint_position" else DESIGN.softer
 
     def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
         timing = self._timing
@@ -349,20 +350,6 @@ def _assessed(guard: StabilityGuard, task: GuardedTask, contacts: tuple[GuardedC
 def _lags(feedback: Feedback) -> list[Feedback]:
     """The feedback with and without its lag: a lag can also stabilise a loop, which is not relied on."""
     return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
-
-
-def rounded_down(value: float) -> float:
-    """To three digits, never up: a value that is named as allowed has to be accepted."""
-    if not value:
-        return 0.0
-    digit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return math.floor(value / digit) * digit
-
-
-def rounded_up(value: float) -> float:
-    """To three digits, never down: as `rounded_down`, for what is named as the least allowed."""
-    digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value else 1.0
-    return math.ceil(value / digit) * digit
 
 
 def posture_of(contact: GuardedContact) -> str:

@@ -80,22 +80,6 @@ class GuardThresholds:
     # N, of commands at which parameters are assessed: the sensed force depends on them
     forces: tuple[float, ...] = (1.0, 40.0)
     on_the_circle: float = 1e-7  # growth of a mode in one period that counts as none
-    longest_delay: int = 50  # periods
-    close: float = 0.9  # of the margin; no plant is known better
-    absurd: float = 1e12  # a number of the loop above it, or below its inverse but not 0, is a slip of the pen
-    # saturation and friction
-    # fractions of the largest contact stiffness that are considered
-    softer: tuple[float, ...] = (1.0, 0.6, 0.35, 0.2, 0.1, 0.03)
-    # of F_des, in saturations, which have to come to rest
-    steps: tuple[float, ...] = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)
-    # saturations, in F_static
-    candidates: tuple[float, ...] = (100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
-    # accepted fraction of the largest saturation found good: between the candidates tried, worse ones may be
-    sure: float = 0.7
-    events: int = 4000  # of the exact integrator, after which a response counts as not settled
-    # rad of the node's own frequency per sample: a faster loop without delay is examined as a continuous one
-    continuous: float = 0.1
-    cycle_excess: float = 1.5  # largest cycle that counts as the stiction cycle, in sizes of (5.8)
     # while the arm moves
     turn: float = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
     shift: float = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again

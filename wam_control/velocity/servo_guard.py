@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.sampled_loop import Feedback, SampledLoop
-from wam_control.force.stability_guard import rounded_down, rounded_up
 from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import ParameterError, aligned, parameter, require
 from wam_description.transmission_map import TransmissionMap
+from wam_theory.rounding import rounded_down, rounded_up
 from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
 
 Array = NDArray[np.float64]

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wam_control.force.loop_design import LoopDesign
 from wam_studies.figures.panels import Mark, Panel, line_only
 from wam_studies.figures.style import draw_panels
 from wam_theory.linear_loop import gain_ratio
+from wam_theory.loop_design import LoopDesign
 from wam_theory.regimes import gamma_3
 from wam_theory.stability_map import largest_stable_steps
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import NamedTuple
 
-from wam_control.force.thresholds import GUARD
 from wam_theory.linear_loop import damping_ratio, routh_gain, sampled_margin
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
+from wam_theory.thresholds import DESIGN
 
 
 class Domain(StrEnum):
@@ -58,20 +58,20 @@ class FrictionVerdict(NamedTuple):
     saturated_cycle: float
 
 
-def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = GUARD.events) -> FrictionVerdict:
+def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = DESIGN.events) -> FrictionVerdict:
     """Verdict on a node under a loop, with its contact and every softer one.
 
     The saturation of the loop counts for `saturated_cycle` only.  A response that has neither settled nor failed
     after `events` of the integrator, samples among them, is undecided, and its saturation is not accepted.
     """
-    nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in GUARD.softer]
+    nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in DESIGN.softer]
     margins = [linear_margin(each, loop) for each in nodes]
     cycle = stiction_cycle(node, loop.gain)
     if loop.gain <= min(margins):
         return FrictionVerdict(Domain.I, min(margins), math.inf, math.inf, cycle, _saturated_cycle(node, loop))
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
-    if not loop.delay_samples and frequency * loop.sample_period < GUARD.continuous:
+    if not loop.delay_samples and frequency * loop.sample_period < DESIGN.continuous:
         loop = replace(loop, sample_period=0.0)
     errors = [stable_errors(each, loop, events) for each in beyond]
     error, undecided = min(each.stable for each in errors), min(each.undecided for each in errors)
@@ -108,7 +108,7 @@ class StableErrors(NamedTuple):
     undecided: float
 
 
-def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = GUARD.events) -> StableErrors:
+def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = DESIGN.events) -> StableErrors:
     """Largest saturation of F_error with which every response ends at rest or in the stiction cycle.
 
     Do not use the largest stable step as the saturation limit: after a larger step the loop oscillates
@@ -118,23 +118,23 @@ def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = GUARD.ev
     if not node.static_friction:
         return StableErrors(0.0, 0.0)
     undecided = 0.0
-    cycle = GUARD.cycle_excess * stiction_cycle(node, loop.gain).peak_to_peak
-    for part in GUARD.candidates:
+    cycle = DESIGN.cycle_excess * stiction_cycle(node, loop.gain).peak_to_peak
+    for part in DESIGN.candidates:
         limit = part * node.static_friction
-        if limit <= loop.deadband / GUARD.sure:
+        if limit <= loop.deadband / DESIGN.sure:
             break
         comes_to_rest = _comes_to_rest(node, replace(loop, error_limit=limit), cycle, events)
         if comes_to_rest is not False:
-            undecided = undecided or GUARD.sure * limit
+            undecided = undecided or DESIGN.sure * limit
         if comes_to_rest:
-            return StableErrors(GUARD.sure * limit, undecided)
+            return StableErrors(DESIGN.sure * limit, undecided)
     return StableErrors(0.0, undecided)
 
 
 def _saturated_cycle(node: FrictionNode, loop: IntegralLoop) -> float:
     if math.isinf(loop.error_limit) or not loop.sample_period:
         return 0.0
-    ends = [assess(node, loop, force, start, max_events=GUARD.events) for force, start in _responses(node, loop)]
+    ends = [assess(node, loop, force, start, max_events=DESIGN.events) for force, start in _responses(node, loop)]
     return max([0.0, *(end.peak_to_peak for end in ends if end.verdict is Verdict.LIMIT_CYCLE)])
 
 
@@ -143,7 +143,7 @@ def _responses(node: FrictionNode, loop: IntegralLoop) -> list[tuple[float, tupl
     limit = loop.error_limit
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     thrown = 3.0 * limit / node.contact_stiffness * frequency
-    tries = [(part * limit, (0.0, 0.0, 0.0)) for part in GUARD.steps]
+    tries = [(part * limit, (0.0, 0.0, 0.0)) for part in DESIGN.steps]
     return [*tries, (0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
 
 

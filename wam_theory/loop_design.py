@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_control.force.friction_verdict import Domain, FrictionVerdict, friction_verdict
-from wam_control.force.stability_guard import rounded_down
-from wam_control.force.thresholds import GUARD
+from wam_theory.friction_verdict import Domain, FrictionVerdict, friction_verdict
 from wam_theory.linear_loop import damping_ratio, gain_ratio
+from wam_theory.rounding import rounded_down
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
+from wam_theory.thresholds import DESIGN
 
-EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
 ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop changes the margin"
 
 
@@ -57,17 +56,17 @@ class LoopDesign(NamedTuple):
         if undecided > verdict.stable_error:
             lines.append(
                 f"undecided: up to {undecided:.4g} all responses that were followed to their end come to rest, but "
-                f"some were not followed to their end ({EVENTS} events)"
+                f"some were not followed to their end ({DESIGN.patient_events} events)"
             )
         if verdict.saturated_cycle:
             lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
-        lower = f"lower the gain to {rounded_down(GUARD.close * verdict.margin):g}, {GUARD.close:g} of the margin"
+        lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the margin"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)
             saturate = f", or saturate the error at {error:g}" if error else ""
             finding = "not shown to be safe" if self.loop.error_limit <= undecided else "not safe"
             lines.append(f"{finding}: {lower}{saturate}")
-        elif GUARD.close < part <= 1.0:
+        elif DESIGN.close < part <= 1.0:
             lines.append(f"close to the margin: a plant that differs a little may be unstable; {lower}")
         return "\n".join(lines)
 
@@ -103,15 +102,15 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
             raise ValueError(f"{name} is {value:g}; it must be 0 or more")
     given = {f.name: getattr(one, f.name) for one in (node, loop) for f in fields(one)} | {"rate": rate, "delay": delay}
     for name, value in given.items():
-        if 0.0 < abs(value) < 1.0 / GUARD.absurd or GUARD.absurd < abs(value) < math.inf:
-            raise ValueError(f"{name} is {value:g}; it must be between {1.0 / GUARD.absurd:g} and {GUARD.absurd:g}")
+        if 0.0 < abs(value) < 1.0 / DESIGN.absurd or DESIGN.absurd < abs(value) < math.inf:
+            raise ValueError(f"{name} is {value:g}; it must be between {1.0 / DESIGN.absurd:g} and {DESIGN.absurd:g}")
     if delay and not rate:
         raise ValueError(f"delay is {delay:g} s and rate is 0; give the rate of the samples, Hz")
     samples = math.ceil(delay * rate - 1e-9)
-    if samples > GUARD.longest_delay:
+    if samples > DESIGN.longest_delay:
         raise ValueError(
-            f"delay is {delay:g} s, {samples} periods; allowed: {GUARD.longest_delay} periods, "
-            f"{GUARD.longest_delay / rate:g} s"
+            f"delay is {delay:g} s, {samples} periods; allowed: {DESIGN.longest_delay} periods, "
+            f"{DESIGN.longest_delay / rate:g} s"
         )
     sampled = replace(loop, sample_period=1.0 / rate if rate else 0.0, delay_samples=samples)
     plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
@@ -119,7 +118,7 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
     gamma = float(gain_ratio(loop.gain, *plant))
     try:
         with np.errstate(over="raise", invalid="raise"):
-            return LoopDesign(node, sampled, gamma, zeta, friction_verdict(node, sampled, EVENTS))
+            return LoopDesign(node, sampled, gamma, zeta, friction_verdict(node, sampled, DESIGN.patient_events))
     except ArithmeticError:
         worst = max((name for name in given if 0.0 < given[name] < math.inf), key=lambda n: abs(math.log(given[n])))
         raise ValueError(

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wam_control.force.friction_verdict import Domain
-from wam_control.force.loop_design import loop_design
-from wam_control.force.thresholds import GUARD
+from wam_theory.friction_verdict import Domain
+from wam_theory.loop_design import loop_design
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
+from wam_theory.thresholds import DESIGN
 
 SOFTER = np.geomspace(0.03, 1.0, 12)
 
@@ -97,7 +97,7 @@ def of_margin(part: float, node: FrictionNode = NODE, limit: float = np.inf) -> 
 @pytest.fixture
 def with_this_contact_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Softer contacts, which the test of the margin has, are left out: each takes seconds."""
-    monkeypatch.setattr("wam_control.force.friction_verdict.GUARD", replace(GUARD, softer=(1.0,)))
+    monkeypatch.setattr("wam_theory.friction_verdict.DESIGN", replace(DESIGN, softer=(1.0,)))
 
 
 @pytest.mark.slow
@@ -129,7 +129,7 @@ def test_a_loop_that_is_sampled_fast_has_the_domain_of_the_continuous_one() -> N
 def test_a_response_that_is_not_followed_to_its_end_is_undecided_and_its_loop_neither_safe_nor_called_unstable(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("wam_control.force.loop_design.EVENTS", 400)  # 20 ms of these samples
+    monkeypatch.setattr("wam_theory.loop_design.DESIGN", replace(DESIGN, patient_events=400))  # 20 ms of these samples
     margin = loop_design(NODE, IntegralLoop(1e-3), 2e4, 5e-4).verdict.margin
     found = loop_design(NODE, IntegralLoop(1.05 * margin, error_limit=1.0), 2e4, 5e-4)
     assert found.verdict.domain is Domain.BEYOND

@@ -1,0 +1,17 @@
+"""Numbers that are advised, to three digits, on the side that is accepted."""
+
+import math
+
+
+def rounded_down(value: float) -> float:
+    """To three digits, never up: a value that is named as allowed has to be accepted."""
+    if not value:
+        return 0.0
+    digit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.floor(value / digit) * digit
+
+
+def rounded_up(value: float) -> float:
+    """To three digits, never down: as `rounded_down`, for what is named as the least allowed."""
+    digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value else 1.0
+    return math.ceil(value / digit) * digit
