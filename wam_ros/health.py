@@ -1,8 +1,9 @@
 """What a node reports: its status, latched, where it changes; a driver in realtime repeats it; its diagnostics."""
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -33,6 +34,26 @@ def problem_of(cause: str, reason: str) -> Event | None:
     return fault(cause, reason=reason) if reason else None
 
 
+@dataclass
+class Refusal:
+    """The messages of a topic that a node has refused.
+
+    Attributes
+    ----------
+    count : of all.
+    reason : why the newest was.
+    stamp : of the newest that the node itself has refused, ns, which comes to each of its steps until the next one.
+    stated : reason that the status has, '' where it has none.
+    recent : newest reason since the last report that the status may have, '' where there was none.
+    """
+
+    count: int = 0
+    reason: str = ""
+    stamp: int | None = None
+    stated: str = ""
+    recent: str = ""
+
+
 class Health:
     """What one node reports: its status with its problems and refusals, and once a second its diagnostics.
 
@@ -45,26 +66,24 @@ class Health:
     Attributes
     ----------
     status : as it was published last.
-    counts : steps, refused messages and whatever else the node counts, for the diagnostics.
+    plain : of the node's work alone, as it was published last.
+    counts : steps and whatever else the node counts, for the diagnostics.
     facts : further values for the diagnostics.
     live : present values of the shared parameters that the node owns, as facts of its status.
     problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
-    refused : newest reason for which a message was refused, by topic.
-    unusable : why messages of a topic are refused, by topic, up to a report before which none was.
+    refusals : by topic.
     session : of the driver that this node follows, 0 before it is known.
     is_ready : whether every expected peer is connected.
     """
 
     def __init__(self, node: Any, outlets: Outlets, shared: Shared) -> None:
         self._node, self._outlets, self._shared = node, outlets, shared
-        self.status = self._plain = WAITING
+        self.status = self.plain = WAITING
         self.counts: Counter[str] = Counter()
         self.digests = digests(shared)
         self.live: dict[str, str] = {}
         self.problems: dict[str, Event] = {}
-        self.refused: dict[str, str] = {}
-        self.unusable: dict[str, str] = {}
-        self._unusable_since: dict[str, str] = {}  # the last report
+        self.refusals = defaultdict[str, Refusal](Refusal)
         self.session = 0
         self.is_ready = False
         self._changes: tuple[int, dict[str, str]] = (-1, {})  # stamp of the step before, and what was taken after it
@@ -76,8 +95,8 @@ class Health:
 
     def publish(self, status: NodeStatus) -> None:
         """Publish the status of the node's work, where it has changed; a driver's has its problems already."""
-        self._plain = status
-        status = with_refused(status, self.unusable)
+        self.plain = status
+        status = with_refused(status, {topic: one.stated for topic, one in self.refusals.items() if one.stated})
         if self.problems and not status.mode:
             events = (*status.events, *self.problems.values())
             status = status._replace(level=Level.ERROR, message=self.problem, fault=self.problem, events=events)
@@ -91,7 +110,7 @@ class Health:
 
     def publish_again(self) -> None:
         """Publish the status with the present problems and refusals; that the node is ready, where it has none yet."""
-        self.publish(READY if self._plain is WAITING and self.is_ready else self._plain)
+        self.publish(READY if self.plain is WAITING and self.is_ready else self.plain)
 
     def _whole(self, status: NodeStatus) -> NodeStatus:
         """A status with what the other nodes compare, and take, of the shared parameters."""
@@ -129,9 +148,9 @@ class Health:
         facts = {} if awaited is None or not self.session else {AWAITED: " ".join(awaited)}  # at the start nobody asks
         self.session = session
         if self.is_ready:
-            plain = self._plain
+            plain = self.plain
             self.publish(self._with(plain, facts))
-            self._plain = plain
+            self.plain = plain
 
     def report_change(self, stamp: int, values: Mapping[str, Any]) -> None:
         """Publish live parameters that the node has taken after its step of a stamp, ns: a replay needs both.
@@ -169,25 +188,30 @@ class Health:
             self._node.get_logger().error(sentence(problem))
         self._node.take_problem(problem)
 
-    def refuse(self, topic: str, reason: str, is_reported: bool = False) -> None:
-        """Count a refused message; the first of several is logged, and the status has the reason.
+    def refuse(self, topic: str, reason: str, is_reported: bool = False, stamp: int | None = None) -> None:
+        """Count a refused message; the first of several is logged, and the status has the reason until a report.
 
         Parameters
         ----------
         is_reported : whether the status has it anyway, or leaves it to the others that are late as well; one a second
             is logged.
+        stamp : of a message that may be refused again, ns; it counts once.
         """
-        self.counts[REFUSED_ON + topic] += 1
-        self.refused[topic] = reason
+        refusal = self.refusals[topic]
+        if stamp is not None:
+            if stamp == refusal.stamp:
+                return
+            refusal.stamp = stamp
+        refusal.count, refusal.reason = refusal.count + 1, reason
         log, text = self._node.get_logger(), f"{topic}: refused: {printable(reason, NODE_LIMITS.reason_length)}"
-        if topic in self._plain.facts.get(REFUSED, "").split(", "):
+        if topic in self.plain.facts.get(REFUSED, "").split(", "):
             return  # the node states it itself
         if is_reported:
             log.warning(text, throttle_duration_sec=NODE_LIMITS.log_period)
         elif topic not in self.problems:
-            self._unusable_since[topic] = reason
-            if topic not in self.unusable:
-                self.unusable[topic] = reason
+            refusal.recent = reason
+            if not refusal.stated:
+                refusal.stated = reason
                 log.warning(text)
                 self.publish_again()
 
@@ -204,8 +228,9 @@ class Health:
         self._last = stamp
         self.facts |= facts()
         self._report()
-        if self.unusable:
-            self.unusable, self._unusable_since = self._unusable_since, {}
+        if any(one.stated for one in self.refusals.values()):
+            for one in self.refusals.values():
+                one.stated, one.recent = one.recent, ""
             self.publish_again()
 
     def report_end(self) -> None:
@@ -216,7 +241,8 @@ class Health:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""
         node, outlets = self._node, self._outlets
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
-        facts = {key: str(count) for key, count in sorted(self.counts.items())}
+        refused = {REFUSED_ON + topic: one.count for topic, one in self.refusals.items()}
+        facts = {key: str(count) for key, count in sorted({**self.counts, **refused}.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
         facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
         facts |= {**self.facts, **more}

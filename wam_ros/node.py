@@ -29,7 +29,7 @@ from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
-from wam_ros.health import problem_of
+from wam_ros.health import WAITING, problem_of
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.requests import Request, RequestQueue
@@ -59,8 +59,6 @@ class AdaptedNode(StackNode):
         self._is_realtime = shared.timing.mode == "realtime"
         self._worked = 0  # stamp of the last step, ns
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
-        self._refused: dict[str, int] = {}
-        self._reported: set[tuple[Any, ...]] = set()  # subjects of the newest status
         self._since, self._is_enabled = 0, False
         self._requests = RequestQueue(self, self._take_refusal)
         self._follower = self._follow_parameters()
@@ -183,11 +181,9 @@ class AdaptedNode(StackNode):
         else:
             self._publish(inputs.stamp, outputs)
         refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
-        for topic, why in refusals.items():  # each message once
-            stamp = inputs.stamp_of(topic)
-            if self._refused.get(topic) != stamp:
-                self.health.refuse(topic, why if isinstance(why, str) else sentence(why), is_reported=True)
-            self._refused[topic] = stamp
+        for topic, why in refusals.items():
+            reason = why if isinstance(why, str) else sentence(why)
+            self.health.refuse(topic, reason, is_reported=True, stamp=inputs.stamp_of(topic))
 
     def _publish(self, stamp: int, outputs: Outputs) -> None:
         for topic, value in outputs.items():
@@ -201,13 +197,12 @@ class AdaptedNode(StackNode):
         self.health.report(stamp, getattr(self.node, "diagnostics", dict))
 
     def _set_status(self, stamp: int, status: NodeStatus) -> None:
+        before = self.health.plain
         self.health.publish(status)
-        before = self._reported  # what only changes in its numbers is reported once
-        self._reported = {event.subject for event in status.events} or {(status.level,)}
         if status.level is Level.ERROR:
             self.get_logger().error(status.message)
         elif status.level is Level.WARN:
-            if not self._reported <= before:
+            if before is WAITING or not _subjects(status) <= _subjects(before):
                 refused = f"{status.facts[REFUSED]}: refused: " if REFUSED in status.facts else ""
                 self.get_logger().warning(refused + status.message)
         elif status.step:
@@ -275,6 +270,11 @@ class AdaptedNode(StackNode):
         self.get_logger().error(refusal)
         if refused := getattr(self.node, "refused", None):
             self._publish(0, refused(refusal))
+
+
+def _subjects(status: NodeStatus) -> set[tuple[Any, ...]]:
+    """What a status is about: one that only changes in its numbers is logged once."""
+    return {event.subject for event in status.events} or {(status.level,)}
 
 
 def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:

@@ -266,8 +266,10 @@ class RunningArm:
 
     def _refusals(self) -> dict[str, str]:
         """The node that refused a message last and its reason, by topic."""
-        found = ((name, node.health.refused) for name, node in self.nodes.items() if hasattr(node, "health"))
-        return {topic: f"{name}: {reason}" for name, refused in found for topic, reason in refused.items()}
+        found = ((name, node.health.refusals) for name, node in self.nodes.items() if hasattr(node, "health"))
+        return {
+            topic: f"{name}: {one.reason}" for name, refusals in found for topic, one in refusals.items() if one.count
+        }
 
     def _present_fault(self) -> str:
         return str(self._driver.safety.fault) if self._driver else ""

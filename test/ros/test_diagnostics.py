@@ -48,8 +48,8 @@ def test_a_refused_message_is_a_warning_for_two_reports_and_stays_counted(hand: 
     heard = Listener(hand.ros, "/diagnostics")
     hand.enable()
     hand.extra = [bad(effort=[])]
-    key, counts = "refused on motor_current_command", hand.node.health.counts
-    hand.ros.wait(lambda: counts[key] == 1)
+    key, refusals = "refused on motor_current_command", hand.node.health.refusals
+    hand.ros.wait(lambda: refusals["motor_current_command"].count == 1)
     found = [next_report(hand, heard) for _ in range(3)]
     warn, ok = DiagnosticStatus.WARN, DiagnosticStatus.OK
     assert [report.level for report in found] == [warn, warn, ok], "up to a report before which none was refused"

@@ -104,7 +104,7 @@ def test_a_force_above_the_limit_is_counted_and_the_last_good_one_remains_in_for
             feeder.feed(newtons)
     assert feeder.heard.seen["force_error"][-1].wrench.force.z < -7.0
     assert feeder.heard.seen["force_error"][-1].wrench.force.z > -9.0
-    assert feeder.loop.health.counts["refused on force_command"] == 2
+    assert feeder.loop.health.refusals["force_command"].count == 2
 
 
 def test_a_torque_in_a_force_command_is_refused_by_name_once_for_each_message(
@@ -116,7 +116,7 @@ def test_a_torque_in_a_force_command_is_refused_by_name_once_for_each_message(
     feeder.feed(8.0, torque=0.5)
     for _ in range(50):
         feeder.feed(None)
-    assert feeder.loop.health.counts["refused on force_command"] == 1
+    assert feeder.loop.health.refusals["force_command"].count == 1
     said = capfd.readouterr().err
     assert said.count("force_command: refused: torque (0.0, 0.0, 0.5) N m is commanded in frame 'base'") == 1
 

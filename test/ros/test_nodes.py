@@ -196,8 +196,8 @@ def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: 
     heard = Listener(hand.ros, "/diagnostics")
     hand.enable()
     hand.extra = [message] * 5
-    refusals = hand.node.health.counts
-    hand.ros.wait(lambda: refusals["refused on motor_current_command"] == 5, what="refusals")
+    refusals = hand.node.health.refusals
+    hand.ros.wait(lambda: refusals["motor_current_command"].count == 5, what="refusals")
     hand.wait_periods(5)
     assert hand.driver.safety.mode is Mode.ENABLED
     flowing = [sample.actual for sample in hand.driver.recent]
@@ -211,8 +211,8 @@ def test_a_command_that_answers_no_state_is_refused_in_realtime(live: Hand) -> N
     live.enable()
     live.is_answering = False
     stamps = [0, -5 * MS, live.driver.stamp + 10_000 * MS]
-    refused = live.node.health.counts
-    while (count := refused["refused on motor_current_command"]) < 3:
+    refused = live.node.health.refusals
+    while (count := refused["motor_current_command"].count) < 3:
         live.publisher.publish(joint_state(stamps[count], MOTORS, State([], [], [3.0] * 4)))
         live.wait_periods(1)
     live.wait_periods(60)
@@ -236,7 +236,7 @@ def test_two_publishers_of_the_command_are_a_fault_and_the_second_never_reaches_
     for _ in range(20):
         second.publish(joint_state(live.driver.stamp, MOTORS, State([], [], [3.0] * 4)))
     live.wait_periods(20)
-    assert live.node.health.counts["refused on motor_current_command"] > 0
+    assert live.node.health.refusals["motor_current_command"].count > 0
     assert all(max(map(abs, sample.actual)) < 2.0 for sample in live.driver.recent)
     live.ask("reset_fault")
     assert "only one node may" in live.ask("enable", True).message
@@ -344,7 +344,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
     row = BY_NAME["sim/disturbance"]
     publisher = hand.ros.node("pusher").create_publisher(message_type(row), row.name, qos(row))
     hand.ros.wait(publisher.get_subscription_count)
-    refusals, push = hand.node.health.counts, encoder(row, WAM.shared)
+    refusals, push = hand.node.health.refusals, encoder(row, WAM.shared)
     zero = (0.0, 0.0, 0.0)
     for k, wrench in enumerate(
         [
@@ -355,7 +355,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
         ]
     ):
         publisher.publish(push(hand.driver.stamp, wrench))
-        hand.ros.wait(lambda k=k: refusals["refused on sim/disturbance"] == k + 1)
+        hand.ros.wait(lambda k=k: refusals["sim/disturbance"].count == k + 1)
     assert hand.driver.plant.loads() == []
     publisher.publish(push(hand.driver.stamp, Wrench("outer_link", (0.0, 2.0, 0.0), (0.0, 0.0, 0.6))))
     hand.ros.wait(hand.driver.plant.loads)

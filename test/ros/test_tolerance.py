@@ -175,7 +175,7 @@ def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, cap
     lines = [line for line in capfd.readouterr().err.splitlines() if "refused" in line]
     assert 1 <= len(lines) <= 3
     assert sum(map(len, lines)) < 3000
-    assert gravity.health.counts["refused on joint_states"] == 500
+    assert gravity.health.refusals["joint_states"].count == 500
 
 
 def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: Any, tmp_path: Path, capfd: Any) -> None:
