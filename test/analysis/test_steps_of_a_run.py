@@ -481,7 +481,7 @@ def test_a_failed_task_leaves_a_report(tmp_path, capsys):
     script.write_text(json.dumps({"steps": steps}))
     configuration = Configuration.load(packaged("wam"))
     assert "no contact" in record(configuration, load_steps(script, configuration.shared), bag)
-    assert _report(bag, True, task).is_there
+    assert _report(bag, True, task) is not None
     out, err = capsys.readouterr()
     assert "no report of task follow-surface" in err
     assert "Wrong: Step 'lower onto nothing'" in out

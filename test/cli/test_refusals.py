@@ -13,7 +13,7 @@ OWN = "steps:\n  - {name: release, seconds: 0.1, request: enable}\n"
 REFUSED = [
     ("evaluate guard --cases -3", "argument --cases: '-3' is not allowed; give a whole number of at least 1"),
     ("evaluate contact --jobs 0", "argument --jobs: '0' is not allowed; give a whole number from 1 to 1024"),
-    ("evaluate contact --free nan", "argument --free: 'nan' is not allowed; give a number of at least 0"),
+    ("evaluate contact --free nan", "argument --free: 'nan' is not allowed; give a number from 0 to 1e+09"),
     ("identify --excite e.yaml --seconds inf", "'inf' is not allowed; give a number from 10 to 3600, in s"),
     ("identify bag --seed 0", "--seed has no effect without --excite; leave it out, or give --excite"),
     ("sweep t.csv --vary seed=1 --seed 0", "--seed has no effect without --random"),
@@ -87,7 +87,7 @@ def test_it_is_refused_with_the_reason_and_nothing_is_written(
     "words",
     [
         "experiment creep --directory CLOSED/bags",
-        "bag record --directory CLOSED/bags",
+        "bag record --set recorder:directory=CLOSED/bags",
         "evaluate figures --results CLOSED/x",
         "analyse bag --html CLOSED/x.html",
     ],

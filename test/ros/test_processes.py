@@ -433,7 +433,7 @@ def test_record_takes_mode_and_nodes_from_the_running_stack(
     configured = Configuration.load(packaged("wam")).with_nodes("own_echo:Echo").with_values({"timing.mode": mode})
     path = os.pathsep.join([str(ROOT), str(tmp_path)])
     with Composition(configured, "left", domain_id) as composition:
-        words = ("--name", "mine", "--directory", str(tmp_path / "bags"), "--namespace", "left")
+        words = ("--name", "mine", "--set", f"recorder:directory={tmp_path / 'bags'}", "--namespace", "left")
         stack = started("-m", "wam_cli.main", "bag", "record", *words, PYTHONPATH=path)
         begin = time.monotonic()
         composition.spin(lambda: recorded(stack) > 100_000 or time.monotonic() - begin > LONG)
@@ -454,7 +454,7 @@ def test_record_without_a_stack_ends_with_the_reason_and_no_bag(
     tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
     monkeypatch.setattr("wam_ros.client.CALL_LIMITS", replace(CALL_LIMITS, answer=0.2))
-    code, _, err = command(capfd, "bag", "record", "--directory", str(tmp_path / "bags"))
+    code, _, err = command(capfd, "bag", "record", "--set", f"recorder:directory={tmp_path / 'bags'}")
     assert (code, list(tmp_path.glob("bags/*"))) == (1, [])
     assert err == "wam bag: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
 

@@ -8,7 +8,7 @@ from wam_bag.bag import Bag, read
 from wam_bag.bag_file import files
 from wam_bag.losses import PARAMETERS, RECORDING, Losses
 from wam_bag.repair import Repaired, repair
-from wam_cli.options import configuration_of, recording_folder, take_configuration, take_stack, writable_directory
+from wam_cli.options import configuration_of, recording_folder, take_configuration, take_stack
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, option_values
 from wam_description.interface import Interface
@@ -31,11 +31,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     text = "record every topic of a running stack until Ctrl-C"
     record = requests.add_parser("record", help=text, description=text, epilog=OF_RECORDER)
     record.add_argument("--name", default="", help="name of the bag; default: name of the arm, date and time")
-    record.add_argument(
-        "--directory",
-        type=writable_directory,
-        help="directory for the bag; default: recorder:directory of the configuration",
-    )
     take_stack(record)
     take_configuration(record)
 
@@ -57,12 +52,9 @@ def _record(given: argparse.Namespace) -> None:
         if not name.startswith(f"{RECORDER}:"):
             raise ValueError(
                 f"--set {name} has no effect here: the running stack has its own; "
-                f"set only parameters of the recorder, for example --set {RECORDER}:split_time=60.0"
+                f"set only parameters of the recorder, for example --set {RECORDER}:directory=bags"
             )
-    own = {f"{RECORDER}:name": given.name}
-    if given.directory:
-        own[f"{RECORDER}:directory"] = str(given.directory)
-    configuration = configuration_of(given).with_values(own)
+    configuration = configuration_of(given).with_values({f"{RECORDER}:name": given.name})
     recording_folder(configuration, given.name)
     from wam_ros.client import StackClient  # the other requests need no ROS
     from wam_ros.node import node_makers, parameter_file

@@ -41,13 +41,6 @@ WITHOUT_ROS = (
 )
 
 
-class PrintedReport(NamedTuple):
-    """Whether there is a report, and what in it is not as it should be."""
-
-    is_there: bool
-    unmet: tuple[str, ...] = ()
-
-
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `wam demo` to its parser."""
     parser.epilog = EXIT_CODES
@@ -86,18 +79,18 @@ def run(given: argparse.Namespace) -> int:
     if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
-    stated, bag_word = stoppable_report(bag, bool(failures), task), shlex.quote(str(bag))
-    if failures:
-        stream = sys.stdout if stated.is_there else sys.stderr  # that of the report
+    unmet, bag_word = stoppable_report(bag, bool(failures), task), shlex.quote(str(bag))
+    if failures or unmet is None:
+        stream = sys.stderr if unmet is None else sys.stdout  # that of the report
         print(f"\nthe demonstration failed: {', '.join(failures)}", file=stream)
-        if stated.is_there:
+        if unmet is not None:
             print(f"next: wam analyse {bag_word}", file=stream)
         if configuration.shared.timing.mode == "realtime":
             print("next: wam demo    # without --realtime: lockstep waits for a busy computer", file=stream)
         return 1
     print(f"next     wam live {bag_word}       # the recording in the browser")
     print(f"         wam analyse {bag_word}    # measured and compared with theory")
-    return exit_code_of(stated.unmet)
+    return exit_code_of(unmet)
 
 
 def report_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:
@@ -131,16 +124,16 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     return list(steps)
 
 
-def stoppable_report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
-    """Print the report; a signal ends the program with where the recording is, which is closed."""
+def stoppable_report(bag: Path, failed: bool, task: Experiment | None) -> tuple[str, ...] | None:
+    """Print the report, see `_report`; a signal ends the program with where the recording is, which is closed."""
     again = f"wam analyse {shlex.quote(str(bag))} --steps"
     stated = "stopped before the report was finished"
     end_at_once_on_signals(f"\n{stated}; the recording is in {bag}; to print the report: {again}\n")
     return _report(bag, failed, task)
 
 
-def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
-    """Print the report; of a demonstration that failed, as far as there is one."""
+def _report(bag: Path, failed: bool, task: Experiment | None) -> tuple[str, ...] | None:
+    """Print the report; what in it is not as it should be, None where a demonstration that failed has no report."""
     try:
         text, unmet = _report_of_task(task, bag) if task else _report_of_demonstration(bag)
         print(text, flush=True)
@@ -148,8 +141,8 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
         if not failed:
             raise
         print(f"no report{f' of task {task.name}' if task else ''}: {error}", file=sys.stderr)
-        return _report(bag, failed, None) if task else PrintedReport(False)  # how far it came
-    return PrintedReport(True, unmet)
+        return _report(bag, failed, None) if task else None  # how far it came
+    return unmet
 
 
 def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:

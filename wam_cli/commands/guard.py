@@ -19,11 +19,6 @@ PLANT = {  # option: what it is
     "friction": "dynamic (Coulomb) friction, N m or N",
     "gain": "integral gain G_I, rad/s per N m or m/s per N",
 }
-LOOP = {  # option: default, what it is
-    "limit": (math.inf, "saturation of the error, N m or N; default: none"),
-    "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
-    "delay": (0.0, "delay from sample to command, s; default: 0"),
-}
 SERVO = "velocity_loop"
 WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered")  # facts of a running arm
 
@@ -37,8 +32,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
     own.add_argument("--stiction", type=float, help="static friction, N m or N; default: the dynamic friction")
-    for name, (_, text) in LOOP.items():
-        own.add_argument(f"--{name}", type=float, help=text)
+    own.add_argument("--limit", type=float, default=math.inf, help="saturation of the error, N m or N; default: none")
+    own.add_argument("--rate", type=float, default=0.0, help="sampling rate, Hz; default: 0, a continuous loop")
+    own.add_argument("--delay", type=float, default=0.0, help="delay from sample to command, s; default: 0")
     own.add_argument(
         "--picture", type=PICTURE, help="draw the loop and the bound of stability into this PNG, PDF or SVG"
     )
@@ -82,14 +78,10 @@ def _assess(given: argparse.Namespace) -> int:
             f"--{missing[0]} is missing, {PLANT[missing[0]]}; give all of --{', --'.join(PLANT)}; 'wam analyse' "
             "gives inertia, damping and friction of a recorded joint"
         )
-    value = {name: getattr(given, name) for name in PLANT}
-    value |= {
-        name: default if getattr(given, name) is None else getattr(given, name) for name, (default, _) in LOOP.items()
-    }
-    stiction = value["friction"] if given.stiction is None else given.stiction
-    loop = IntegralLoop(value["gain"], error_limit=value["limit"])
-    plant = value["inertia"], value["damping"], value["transmission"], value["contact"], value["friction"], stiction
-    design = loop_design(FrictionNode(*plant), loop, value["rate"], value["delay"])
+    *plant, gain = (getattr(given, name) for name in PLANT)
+    stiction = given.friction if given.stiction is None else given.stiction
+    loop = IntegralLoop(gain, error_limit=given.limit)
+    design = loop_design(FrictionNode(*(*plant, stiction)), loop, given.rate, given.delay)
     print(design.text())
     if given.picture:
         draw(design, given.picture)

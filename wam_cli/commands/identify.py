@@ -24,10 +24,10 @@ from wam_cli.options import (
     bounded,
     configuration_file,
     configuration_of,
+    recording_folder,
     require_option,
     take_arm,
     take_configuration,
-    writable_directory,
 )
 from wam_control.task.scenario import load_for
 from wam_description.arm import Shared
@@ -60,9 +60,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only-write", action="store_true", help="with --excite: write the scenario and do not play it"
     )
-    parser.add_argument(
-        "--directory", type=writable_directory, help="with --excite: directory of the bag, default bags"
-    )
     parser.add_argument("--write", type=MODEL, metavar="YAML", help="write the model as a configuration")
     parser.add_argument(
         "--force", action="store_true", help="with --write: also write a model that contradicts the configured arm"
@@ -75,7 +72,7 @@ def run(given: argparse.Namespace) -> int:
     """Identify the model of the controllers from a bag."""
     if (given.bag is None) == (given.excite is None):
         raise ValueError("give a bag, or --excite SCENARIO to make one")
-    require_option(given, "--excite", "--seconds", "--seed", "--only-write", "--directory")
+    require_option(given, "--excite", "--seconds", "--seed", "--only-write")
     configuration = configuration_of(given)
     if given.write and given.write.resolve() in [one.resolve() for one in files_of(configuration_file(given))]:
         raise ValueError(f"{given.write} would be overwritten, but this command reads it; give another file")
@@ -158,7 +155,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     print(f"written: {given.excite}; on a real arm: {on_arm}", flush=True)
     if given.only_write:
         return None
-    bag = (given.directory or writable_directory("bags")) / f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    bag = recording_folder(configuration, "") / f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
     stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
     played = configuration.with_values({"timing.dither_cycle": 0})
     failure = record(
