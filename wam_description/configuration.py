@@ -67,8 +67,7 @@ class Configuration(NamedTuple):
 
     def __repr__(self) -> str:
         """Path and sections, not every value."""
-        changed = "" if self.path.is_file() and self.path.read_text(encoding="utf-8") == self.text else ", changed"
-        return f"Configuration({str(self.path)!r}, sections {', '.join(self.sections)}{changed})"
+        return f"Configuration({str(self.path)!r}, sections {', '.join(self.sections)})"
 
     @property
     def text(self) -> str:
@@ -364,10 +363,6 @@ def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
             f"{path}: {BASE} is {name!r}; give the name of a configuration or a path relative to the file"
         )
     base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
-    if len(above) >= FILES.overlays:
-        raise ParameterError(
-            f"{above[0]}: more than {FILES.overlays} files build on each other by '{BASE}'; merge some of them"
-        )
     if base.resolve() in (path.resolve(), *above):
         raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")
     return base

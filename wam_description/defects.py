@@ -5,6 +5,7 @@ returns may be any sequence of numbers, as a numpy array; the others get lists a
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from itertools import repeat
 from math import isfinite, isinf, isnan
 from typing import Any
 
@@ -72,12 +73,14 @@ def output_check(node: str, topic: Topic, defect_of: Callable[[Any], str] = lamb
     topic : row of the table of topics, of one of the types that carry numbers.
     defect_of : see `defect_finder`; without it NaN, too, is a value, as where no other node takes the output.
     """
-    kind, convert = _KINDS[topic.type], _AS_TAKEN[topic.type]
+    kind = _KINDS[topic.type]
 
     def check(value: Any) -> Any:
         defect = "" if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
         try:
-            if not defect and not (defect := defect_of(taken := convert(value))):
+            if not defect and not (
+                defect := defect_of(taken := kind(*map(_as_taken, repeat(kind), kind._fields, value)))
+            ):
                 return taken
         except (TypeError, ValueError, OverflowError) as error:
             defect = f"{value} cannot be sent: {error}"
@@ -107,28 +110,16 @@ def _listed(name: str, values: Any, of: str = "floats") -> Iterable[Any]:
     return values
 
 
-def _framed(frame: Any) -> str:
-    if not isinstance(frame, str):
-        raise TypeError(f"frame is {frame!r}; return a text")
-    return frame
-
-
-def _as_table(table: Table) -> Table:
-    return Table(
-        _framed(table.frame), tuple(tuple(_floats("a row", row)) for row in _listed("rows", table.rows, "rows"))
-    )
-
-
-_AS_TAKEN: dict[str, Callable[[Any], Any]] = {
-    JOINT_STATE: lambda state: State(*map(_floats, State._fields, state)),
-    WRENCH: lambda wrench: Wrench(
-        _framed(wrench.frame),
-        tuple(_floats("force", wrench.force)),  # type: ignore[arg-type]
-        tuple(_floats("torque", wrench.torque)),  # type: ignore[arg-type]
-    ),
-    POINT: lambda point: Point(_framed(point.frame), tuple(_floats("position", point.position))),  # type: ignore[arg-type]
-    TABLE: _as_table,
-}
+def _as_taken(kind: Any, name: str, value: Any) -> Any:
+    """A field of a message of a kind: a frame, the rows of a table, or numbers."""
+    if name == "frame":
+        if not isinstance(value, str):
+            raise TypeError(f"frame is {value!r}; return a text")
+        return value
+    if name == "rows":
+        return tuple(tuple(_floats("a row", row)) for row in _listed(name, value, "rows"))
+    numbers = _floats(name, value)
+    return numbers if kind is State else tuple(numbers)
 
 
 _STATE_LIMITS = tuple((name, LARGEST[name]) for name in State._fields)

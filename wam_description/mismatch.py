@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-import numpy as np
-
 from wam_description.arm import Arm
 from wam_description.parameters import aligned, parameter
 from wam_description.parts import Joints, Links, Motors
@@ -62,14 +60,10 @@ def _with_friction(shafts: Shafts, factors: Sequence[float]) -> Shafts:
 
 
 def _scaled_links(arm: Arm, mismatch: ModelMismatch) -> Links:
-    links = arm.links
-    mass = np.multiply(links.mass, mismatch.mass)
-    inertia, product = (
-        _row(np.reshape(values, (-1, 3)) * np.array(mismatch.mass)[:, None])
-        for values in (links.inertia, links.product)
+    links, of_elements = arm.links, [factor for factor in mismatch.mass for _ in range(3)]
+    return dataclasses.replace(
+        links,
+        mass=_scaled(links.mass, mismatch.mass),
+        inertia=_scaled(links.inertia, of_elements),
+        product=_scaled(links.product, of_elements),
     )
-    return dataclasses.replace(links, mass=_row(mass), inertia=inertia, product=product)
-
-
-def _row(values: np.ndarray) -> tuple[float, ...]:
-    return tuple(values.ravel().tolist())

@@ -140,7 +140,7 @@ def principal_inertia(shape: str, size: Sequence[float], mass: float) -> tuple[f
 
 
 def require_solids(group: str, given: Any, shapes: Mapping[str, int] = BOX) -> None:
-    """Refuse lists that are not `named`, unknown shapes, and sizes that are not above 0.
+    """Refuse lists that are not `named`, and sizes that are not above 0.
 
     Parameters
     ----------
@@ -151,7 +151,6 @@ def require_solids(group: str, given: Any, shapes: Mapping[str, int] = BOX) -> N
     named(group, given)
     for one in rows(given):
         shape = getattr(one, "shape", "box")
-        require(shape in shapes, f"{one.name}: {group}.shapes is '{shape}'; allowed: {', '.join(shapes)}")
         needed = one.size[: shapes[shape]]
         require(
             all(size > 0.0 for size in needed),

@@ -8,7 +8,8 @@ nowhere else.  The same classes check the values, describe the parameters to ROS
 import dataclasses
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from functools import cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
@@ -123,21 +124,17 @@ def like(cls: type, name: str, doc: str = "") -> Any:
     return parameter(doc or other.doc, other.unit, other.low, other.high, width=other.width, follows=name)
 
 
-_FIELDS: dict[type, tuple[Field, ...]] = {}
-_HINTS: dict[type, dict[str, Any]] = {}
+_hints: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 
 
 def fields(cls: type) -> tuple[Field, ...]:
     """Every parameter of a class, nested classes as dotted names, in order of declaration."""
-    if cls not in _FIELDS:
-        _FIELDS[cls] = tuple(_declared(cls))
-    return _FIELDS[cls]
+    return _fields(cls)
 
 
-def _hints(cls: type) -> dict[str, Any]:
-    if cls not in _HINTS:
-        _HINTS[cls] = get_type_hints(cls)
-    return _HINTS[cls]
+@cache
+def _fields(cls: type) -> tuple[Field, ...]:
+    return tuple(_declared(cls))
 
 
 def _declared(cls: type) -> Iterator[Field]:

@@ -104,10 +104,6 @@ class RigidBody:
         poses = ([0.3 * (i + 1) * sign for i in range(n)] for sign in (1.0, -1.0))
         return any(float(np.abs(self.point_jacobian(q, cover, p)).max()) >= MODEL.small for q in poses)
 
-    def start_velocities(self, q: ArrayLike, qd: ArrayLike) -> dict[str, Array]:
-        """Velocity, (3,), m/s, of the origin of every cover in `moving`."""
-        return {name: self.point_jacobian(q, name, (0.0, 0.0, 0.0)) @ _vector(qd) for name in self.moving}
-
     def cover_jacobian(self, q: ArrayLike, cover: str) -> Array:
         """Motion of a cover per joint velocity, in the cover's frame.
 

@@ -24,7 +24,6 @@ class FileThresholds:
     """What is named of a configuration, and what can be none."""
 
     longest_value: int = 60  # characters of a value that is refused
-    overlays: int = 20  # files that build on each other
     differences: int = 12  # parameters that are named as different from the base
     longest_difference: int = 100  # characters of two values
     disagreements: int = 3  # parameters that are named where two nodes have different ones

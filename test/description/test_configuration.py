@@ -212,13 +212,6 @@ def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path
         Simulation(found, [])
 
 
-def test_files_that_build_on_each_other_without_end_are_refused_in_one_line(tmp_path: Path) -> None:
-    for k in range(100):
-        (tmp_path / f"{k}.yaml").write_text(f"base: {k + 1}.yaml\n")
-    with pytest.raises(ParameterError, match=r"0.yaml: more than 20 files build on each other by 'base'; merge some"):
-        Configuration.load(tmp_path / "0.yaml")
-
-
 def test_a_section_may_be_empty(tmp_path: Path) -> None:
     """That of a node without parameters is."""
     path = tmp_path / "mine.yaml"

@@ -189,7 +189,6 @@ def test_the_inertia_is_that_of_a_uniform_body() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bodies": {"shapes": ("cone",)}}, "thing: world.bodies.shapes is 'cone'; allowed: box, cylinder, ball"),
         ({"bodies": {"sizes": (0.05, 0.0, 0.04)}}, "thing: world.bodies.sizes of a box begins with 0.05, 0, 0.04 m"),
         ({"bodies": {"names": ("table",)}}, "obstacles, pushers, bodies and doors are named table"),
         ({"doors": {"upper": (-0.1,)}}, "door: world.doors.lower is -3 rad, upper -0.1 rad; 0, the angle at power-up"),

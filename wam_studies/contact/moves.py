@@ -76,8 +76,6 @@ class MoveGenerator:
         for s in np.linspace(0.1, 0.9, 9):
             q = here + way * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
             qd = way * 30.0 * s * s * (1.0 - s) ** 2 / seconds
-            for velocity in self._body.start_velocities(q, qd).values():
-                worst = max(worst, float(np.linalg.norm(velocity)) / MOVES.elbow_speed)
-            tip = self._body.tool_jacobian(q) @ qd
-            worst = max(worst, float(np.linalg.norm(tip)) / MOVES.tip_speed)
+            *starts, tip = self._body.start_and_tool_speeds(q, qd)
+            worst = max(worst, *(speed / MOVES.elbow_speed for speed in starts), tip / MOVES.tip_speed)
         return worst
