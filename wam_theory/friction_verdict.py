@@ -42,7 +42,8 @@ class FrictionVerdict(NamedTuple):
     ----------
     domain : of figure 5.8.
     margin : largest gain that is linearly stable with every contact stiffness.
-    stable_error : largest saturation that is accepted; infinite in domain I, 0 in domain III.
+    stable_error : largest saturation that is accepted; infinite in domain I, 0 in domain III and where friction keeps
+        up a cycle.
     undecided_error : largest saturation for which no response was found that does not come to rest, though not all
         were followed to their end; `stable_error` where every response was decided, else above it.
     cycle : stiction limit cycle of small errors.
@@ -68,7 +69,9 @@ def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = DESIG
     margins = [linear_margin(each, loop) for each in nodes]
     cycle = stiction_cycle(node, loop.gain)
     if loop.gain <= min(margins):
-        return FrictionVerdict(Domain.I, min(margins), math.inf, math.inf, cycle, _saturated_cycle(node, loop))
+        kept_up = _saturated_cycle(node, loop)
+        error = 0.0 if kept_up > DESIGN.cycle_excess * cycle.peak_to_peak else math.inf
+        return FrictionVerdict(Domain.I, min(margins), error, error, cycle, kept_up)
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     if not loop.delay_samples and frequency * loop.sample_period < DESIGN.continuous:
