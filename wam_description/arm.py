@@ -97,27 +97,20 @@ class Arm:
     joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
 
     def __post_init__(self) -> None:
-        motors, joints = len(self.motors.names), len(self.joints.names)
-        require(motors == joints, f"the arm has {motors} motors and {joints} joints; give as many of each")
-        require(
-            len(self.joint_from_motor) == motors * joints,
-            f"parameter 'arm.joint_from_motor' has {len(self.joint_from_motor)} values; it needs {motors * joints}",
-        )
-        condition = float(np.linalg.cond(np.reshape(self.joint_from_motor, (joints, motors))))
+        motors, joints, links = self.motors.names, self.joints.names, self.links.names
+        lengths("arm", motors, {"joints.names": joints, "links.names": links})
+        lengths("arm", motors, {"joint_from_motor": self.joint_from_motor}, width=len(joints))
+        condition = float(np.linalg.cond(np.reshape(self.joint_from_motor, (len(joints), len(motors)))))
         require(
             condition < MODEL.condition,
             f"parameter 'arm.joint_from_motor' is singular (condition number {condition:.3g}, allowed below "
             f"{MODEL.condition:g}): each joint needs its own combination of motors",
         )
-        require(
-            len(self.links.names) == joints,
-            f"parameter 'arm.links.names' has {len(self.links.names)} links; {joints} joints need {joints}",
-        )
         for key in ("pretension", "breaking_strength", "damping", "reducer"):
-            lengths("arm.cables", self.motors.names, {key: getattr(self.cables, key)})
+            lengths("arm.cables", motors, {key: getattr(self.cables, key)})
         self.circuits  # noqa: B018 - refuses stages that make no circuit
         for link in self.covers.links:
-            require(link in self.links.names, f"arm.covers.links names '{link}'; links: {', '.join(self.links.names)}")
+            require(link in links, f"arm.covers.links names '{link}'; links: {', '.join(links)}")
         self._require_plausible()
         self._require_joined()
 

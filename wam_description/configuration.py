@@ -112,7 +112,7 @@ class Configuration(NamedTuple):
             flat = sections[self._section(node) if colon else SHARED]
             if parameter not in flat and (colon or parameter not in _NOT_REQUIRED):
                 where = f"node '{node}'" if colon else "section '/**'"
-                meant = self._meant(key, parameter, flat)
+                meant = self._meant(key)
                 raise ParameterError(
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
                     + (
@@ -124,20 +124,18 @@ class Configuration(NamedTuple):
             flat[parameter] = like(flat.get(parameter), value)
         return Configuration(self.path, _frozen(sections))
 
-    def _meant(self, key: str, parameter: str, flat: Mapping[str, Any]) -> str:
-        """Parameters that `key` may mean: of this name in another section, or with a similar one in `flat`."""
+    def _meant(self, key: str) -> str:
+        """Parameters that `key` may mean: of this name in another section, or the one that is most like it."""
         keys = {
             name if section == SHARED else f"{section.rpartition('/')[2]}:{name}"
             for section, names in self.sections.items()
             for name in names
         }
-        found = {one for one in keys if one.rpartition(":")[2] == parameter} | {key.replace(".", ":", 1)} & keys
-        place = key[: key.rfind(":") + 1]
-        near = [place + name for name in difflib.get_close_matches(parameter, flat, n=1)]
+        parameter, of_node = key.rpartition(":")[2], key.replace(".", ":", 1)
+        found = sorted(one for one in keys if one.rpartition(":")[2] == parameter or one == of_node)
+        found = found or difflib.get_close_matches(key, keys, n=1)
         # a parameter of all nodes is none of this one, so that its name alone would be what was given
-        return " or ".join(
-            f"'{one}'" + f" of section '{SHARED}'" * (bool(place) and ":" not in one) for one in sorted(found) or near
-        )
+        return " or ".join(f"'{one}'" + f" of section '{SHARED}'" * (":" in key and ":" not in one) for one in found)
 
     def with_sections(self, changes: Mapping[str, Mapping[str, Any]], path: Path | None = None) -> "Configuration":
         """The same configuration with some values replaced, and with sections of further nodes.

@@ -7,7 +7,7 @@ their covariance.
 from dataclasses import dataclass
 from typing import Final
 
-from wam_description.parameters import aligned, like, parameter, require
+from wam_description.parameters import aligned, lengths, like, parameter, require
 from wam_description.parts import Joints, Links, Motors
 
 UNKNOWN: Final = "none"  # in place of the names of identified parameters, where there are none
@@ -78,10 +78,7 @@ class ModelCovariance:
 
     def __post_init__(self) -> None:
         count = len(self.parameters)
-        require(
-            len(self.values) == count * count,
-            f"parameter 'model.covariance.values' has {len(self.values)} values; {count} parameters need {count**2}",
-        )
+        lengths("model.covariance", self.parameters, {"values": self.values}, width=count)
         diagonal = self.values[:: count + 1]
         require(
             min(diagonal) >= 0.0,

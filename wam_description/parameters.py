@@ -335,11 +335,9 @@ def lengths(
     arrays : arrays by the name of their field.
     """
     for name, array in arrays.items():
-        need = "1 name needs" if len(names) == 1 else f"{len(names)} names need"
         require(
             len(array) == width * len(names) or (is_common and len(array) == 1),
-            f"parameter '{group}.{name}' has {len(array)} value{'s' * (len(array) != 1)}; {need} "
-            f"{'1 or ' * is_common}{width * len(names)}",
+            f"parameter '{group}.{name}' has {len(array)} values; it needs {'1 or ' * is_common}{width * len(names)}",
         )
 
 

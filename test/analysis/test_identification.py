@@ -230,8 +230,8 @@ def test_without_an_overlay_the_controllers_model_is_the_arm_bit_for_bit() -> No
     ("values", "text"),
     [
         ({"model.motors.coulomb_positive": [0.1] * 4}, "static_positive 0.05101 N m is below dynamic friction, 0.1"),
-        ({"model.links.mass": [1.0] * 3}, r"'model.links.mass' has 3 values; 4 names need 4"),
-        ({"model.covariance.values": [1.0, 2.0]}, "'model.covariance.values' has 2 values; 1 parameters need 1"),
+        ({"model.links.mass": [1.0] * 3}, r"'model.links.mass' has 3 values; it needs 4"),
+        ({"model.covariance.values": [1.0, 2.0]}, "'model.covariance.values' has 2 values; it needs 1"),
         ({"model.covariance.values": [-1.0]}, "has a variance of -1"),
         ({"model.masses": [1.0]}, "no parameter 'model.masses'"),
     ],

@@ -234,7 +234,7 @@ def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, An
     [
         ("velocity_loop", {"servo.proportional_gain": [1e308] * 4}, "allowed: 0 to 1e+09"),
         ("velocity_loop", {"servo.proportional_gain": [0.3] * 4}, "allowed: servo.proportional_gain up to ["),
-        ("velocity_loop", {"servo.proportional_gain": [0.1] * 3}, "has 3 values; 4 names need 4"),
+        ("velocity_loop", {"servo.proportional_gain": [0.1] * 3}, "has 3 values; it needs 4"),
         ("velocity_loop", {"ages.command": 0.5}, "ages.command"),
         ("gravity", {"servo.proportional_gain": [0.01] * 4}, "servo.proportional_gain"),
         ("force_loop", {"force_limit": 1e308}, "force_limit"),

@@ -497,7 +497,7 @@ def test_a_spring_beyond_the_end_of_its_link_is_refused() -> None:
 
 def test_added_friction_on_the_wrong_number_of_joints_is_refused() -> None:
     hardware = driver()
-    with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 value; 4 names need 4"):
+    with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 values; it needs 4"):
         hardware.set_added_friction([0.1])
 
 

@@ -309,5 +309,5 @@ def test_one_value_counts_for_all_and_a_wrong_number_is_refused() -> None:
     arm = frictionless(WAM)
     four = released(changed(arm, gravity=(0.0, 0.0, 0.0)), law(motor_asymmetry=(0.1,) * 4))
     assert four.theta == released(changed(arm, gravity=(0.0, 0.0, 0.0)), law(motor_asymmetry=(0.1,))).theta
-    with pytest.raises(ParameterError, match=r"friction\.motor_asymmetry' has 2 values; 4 names need 1 or 4"):
+    with pytest.raises(ParameterError, match=r"friction\.motor_asymmetry' has 2 values; it needs 1 or 4"):
         released(arm, law(motor_asymmetry=(0.1, 0.2)))
