@@ -29,7 +29,7 @@ from wam_theory.thresholds import DESIGN
 
 Array = NDArray[np.float64]
 ESTIMATE = "contact_estimate"
-SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, GUARD.largest_scale, 19).tolist())
+SCALES: tuple[float, ...] = (GUARD.least_scale, *np.geomspace(0.01, GUARD.largest_scale, 19).tolist())
 
 
 @dataclass(frozen=True)
@@ -303,10 +303,10 @@ class StabilityGuard:
         most = self.accepted_scale(found)
         surface = f"contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         if not found.scale:
-            also = "force_proportional_gain, " if any(law.proportional_gain) else ""
+            also = ", force_proportional_gain" if any(law.proportional_gain) else ""
             return (
-                f"force_gain {listed(law.gain)} is not stable, nor is a hundredth of it ({found.where}, {surface}); "
-                f"lower posture_gain, {also}or guard.contact_stiffness"
+                f"force_gain {listed(law.gain)} is not stable, nor is any smaller one ({found.where}, {surface}); "
+                f"lower posture_gain{also} or guard.contact_stiffness"
             )
         return (
             f"force_gain {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one: domain "

@@ -75,6 +75,7 @@ class GuardThresholds:
 
     # margins of the linear loop
     largest_scale: float = 10.0  # scale of the gains up to which a margin is searched
+    least_scale: float = 1e-6  # of the gains: with one that is stable only below it, no force is controlled
     halvings: int = 6  # of the gain of the posture, in search of one with which some force gain is stable
     slack: float = 0.003  # the search for a margin ends within 0.2 %
     # N, of commands at which parameters are assessed: the sensed force depends on them
