@@ -307,11 +307,11 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     assert warned.report.facts["gain factor"] == "1"
 
 
-def test_gains_without_any_margin_are_followed_where_the_guard_only_warns() -> None:
+def test_gains_far_above_their_margin_are_followed_where_the_guard_only_warns() -> None:
     own = guarded(bench(force_gain=(5.0,)), mode="warn")
     loop = bench_loop(own)
     assert loop.assessment is not None
-    assert loop.assessment.scale == 0.0
+    assert 0.0 < loop.assessment.scale < 0.01
     assert follow(loop, own.guard.posture, force=(0.0, 1.0, 0.0)) == 0.0
     assert loop.report.facts["gain factor"] == "1"
 
