@@ -28,9 +28,6 @@ def draws(seed: int, n: int, sd: float) -> np.ndarray:
     return sd * np.random.default_rng(seed).standard_normal(n)
 
 
-# stretches
-
-
 # steps
 
 
@@ -241,20 +238,26 @@ def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike
     assert np.sqrt(np.mean(np.square(off))) > 0.1, "errors that hold everything say nothing"
 
 
-def test_three_stated_errors_hold_the_static_friction_of_a_shaft_that_creeps_before_it_moves_off():
-    """A thousandth of the speed of rest, with the torque of dynamic friction: starts alike, all too low."""
+@pytest.mark.parametrize("is_torn_off", [False, True])
+def test_three_stated_errors_hold_the_static_friction_of_a_shaft_that_moves_off_at_less(is_torn_off: bool) -> None:
+    """It creeps with the torque of dynamic friction, or rests with what a motion left in it and is torn off by a push.
+
+    The first start is at static friction.
+    """
     static, dynamic = 0.25, 0.18
     time, velocity, torque = shaft(static, dynamic, 0.0, 0.0)
     starts = np.flatnonzero((velocity[:-1] == 0.0) & (velocity[1:] != 0.0))
-    for start in starts[1:]:  # the first one was at rest
-        torque[start - 60 : start + 1] = np.sign(velocity[start + 1]) * np.append(
-            np.full(57, dynamic), dynamic + (static - dynamic) * np.array([0.3, 0.4, 0.5, 0.6])
-        )
-        velocity[start - 60 : start + 1] = np.sign(velocity[start + 1]) * 1e-4
+    for i, start in enumerate(starts[not is_torn_off :]):
+        creeps = np.append(np.full(57, dynamic), dynamic + (static - dynamic) * np.array([0.3, 0.4, 0.5, 0.6]))
+        left = np.full(61, dynamic * (0.4, 0.7, 1.02)[i % 3])
+        torque[start - 60 : start + 1] = np.sign(velocity[start + 1]) * (left if is_torn_off else creeps)
+        if not is_torn_off:
+            velocity[start - 60 : start + 1] = np.sign(velocity[start + 1]) * 1e-4
     found = identify_friction(time, velocity, torque, rest=0.1, window=0.02)
-    assert found.breakaways > 5
+    assert found.breakaways >= 1
     assert found.static.value < 0.93 * static
-    assert abs(found.static.value - static) < 3.0 * found.static.error < 0.5 * static
+    assert abs(found.static.value - static) < 3.0 * found.static.error
+    assert is_torn_off or 3.0 * found.static.error < 0.5 * static
 
 
 def test_impacts_do_not_spoil_the_friction():
@@ -311,9 +314,6 @@ def test_late_messages_are_not_counted_as_missing(jitter, lost):
     stamp = np.rint(1e7 * (np.arange(4000) + jitter * draws.uniform(-1.0, 1.0, 4000))[kept]).astype(np.int64)
     inner = np.diff(np.flatnonzero(kept)) - 1
     assert stamp_timing(stamp, None).missed == inner.sum()
-
-
-# force
 
 
 # swings

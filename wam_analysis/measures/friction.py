@@ -45,8 +45,9 @@ class Friction(NamedTuple):
     static : torque at which the shaft breaks away, median over the breakaways.  Those nearer to dynamic friction than
         to the third highest are left out: what moves off at less was not quite at rest.  Its error is at least half of
         its rise above `dynamic`: what creeps, too slowly to be seen, moves off at any torque between both, and as often
-        as you like; and at least what the torque changes by in a period before a breakaway: it may be as much again
-        until the shaft slips.  Infinite where the torque rises by no more than it scatters in motion.
+        as you like; and at least what the torque changes by in a period, in the median of all breakaways: it may be as
+        much again until the shaft slips.  One below dynamic friction was torn off: within the period, the torque
+        changed at least to that.  Infinite where the torque rises by no more than it scatters in motion.
     dynamic : torque of dry friction in motion.
     viscous : torque per velocity.
     inertia : torque per acceleration.  Three errors of these hold the truth also where there are few motions.
@@ -172,17 +173,17 @@ def _robust(
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     keep = np.ones(len(wanted), dtype=np.bool_)
-    used = _distinct(columns)
+    used = _distinct(columns, width)
     solution, rest = np.zeros(len(used)), wanted
     for _ in range(4):
         if np.count_nonzero(keep) < SHAFT.fewest_samples:
             break
-        used, solution, rest = _fit(columns, wanted, scale, keep)
+        used, solution, rest = _fit(columns, wanted, scale, keep, width)
         middle = float(np.median(rest[keep]))
         sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
         keep = np.abs(rest - middle) <= max(SHAFT.jump * sd, 1e-12)
-    if _distinct(columns[keep]) != used:  # what was left out was all of one direction
-        used, solution, rest = _fit(columns, wanted, scale, keep)
+    if _distinct(columns[keep], width) != used:  # what was left out was all of one direction
+        used, solution, rest = _fit(columns, wanted, scale, keep, width)
     a = columns[keep][:, used] / scale[used]
     products = a.T @ a
     inverse = np.linalg.pinv(products)
@@ -200,17 +201,22 @@ def _robust(
     return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
 
 
-def _fit(columns: Numbers, wanted: Numbers, scale: Numbers, keep: Mask) -> tuple[list[int], Numbers, Numbers]:
+def _fit(
+    columns: Numbers, wanted: Numbers, scale: Numbers, keep: Mask, width: int
+) -> tuple[list[int], Numbers, Numbers]:
     """Columns that the kept samples distinguish, their factors in terms of `scale`, and what is left of all samples."""
-    used = _distinct(columns[keep])
+    used = _distinct(columns[keep], width)
     scaled = columns[:, used] / scale[used]
     solution = np.asarray(np.linalg.lstsq(scaled[keep], wanted[keep], rcond=None)[0], np.float64)
     return used, solution, wanted - scaled @ solution
 
 
-def _distinct(columns: Numbers) -> list[int]:
-    """Columns that are not zero, without the offset in one direction only: dry friction looks the same."""
-    both = bool(np.ptp(columns[:, 0]) > 0.0)
+def _distinct(columns: Numbers, width: int) -> list[int]:
+    """Columns that are not zero, without the offset in one direction only: dry friction looks the same.
+
+    Fewer than `width` samples, which overlap, show nothing of a direction.
+    """
+    both = min(np.count_nonzero(columns[:, 0] > 0.0), np.count_nonzero(columns[:, 0] < 0.0)) >= width
     return [i for i in range(columns.shape[1]) if np.any(columns[:, i]) and (i != 3 or both)]
 
 
@@ -338,7 +344,7 @@ def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) ->
         return FrictionNumber(static, math.inf), len(torque)
     scatter = 1.4826 * float(np.median(np.abs(torque - static)))
     alike = _few(len(torque) - 1.0) * scatter / math.sqrt(len(torque))
-    step = float(np.median(found.step[count]))
+    step = float(np.median(np.maximum(found.step, dynamic - found.torque)))
     error = math.hypot(alike, SHAFT.creep * (static - dynamic), step, wave)
     return FrictionNumber(static, error), len(torque)
 
