@@ -13,11 +13,12 @@ from PIL import Image
 
 from wam_analysis import arm_picture
 from wam_analysis.drawing import COLOURS, ESTIMATED, STYLE, TRUE
+from wam_analysis.findings.analysis import TOPICS_READ
 from wam_analysis.held_messages import row_at
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
-from wam_analysis.traces import OF_STEPS, ForceSignal
+from wam_analysis.traces import ForceSignal
 from wam_bag.bag import JointColumns, read
 from wam_description.signals import Contact
 
@@ -80,7 +81,7 @@ def contact_at(signal: ForceSignal, row: int) -> Contact:
 
 def save(bag: Path, file: Path) -> None:
     """Draw a recording into an animated WebP file, as good as its size allows."""
-    recording = AnalysedRecording(read(bag, OF_STEPS, may_lack=True))
+    recording = AnalysedRecording(read(bag, TOPICS_READ, may_lack=True))
     joints = recording.run.joints("sim/joint_states")
     assert joints is not None, f"{bag} has no sim/joint_states"
     first, *others = frames(recording, recorded_arm(recording.parameters), joints)

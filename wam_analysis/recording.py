@@ -7,7 +7,7 @@ import numpy as np
 from wam_analysis.command_gaps import CommandGap, command_gaps
 from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contacts, true_contacts
 from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theory_of
-from wam_analysis.findings.transmission import TransmissionFindings, transmission_findings
+from wam_analysis.findings.transmission import TransmissionFriction, transmission_friction
 from wam_analysis.foreign.sources import Source, alternates, command_of, sources
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.holds import holds_of
@@ -266,6 +266,6 @@ class AnalysedRecording:
     # the transmission
 
     @cached_property
-    def motion(self) -> TransmissionFindings:
+    def friction(self) -> TransmissionFriction:
         """Friction of motors and joints."""
-        return transmission_findings(self.run, self.parameters)
+        return transmission_friction(self.run, self.parameters)

@@ -26,6 +26,7 @@ class ShaftThresholds:
     # of the way in one direction: less in the other is a deflection, as by a push, and shows no friction
     both_ways: float = 0.05
     fewest_samples: int = 20  # below which a signal is not evaluated
+    fewest_signals: int = 100  # instants of all motors and joints, with fewer of which their friction is not
     agreeing: int = 3  # breakaways of which the least is taken for the highest: no single one decides
     precise: float = 0.01  # of the torque: noise at a breakaway after the line
     sigmas: float = 3.0  # standard errors by which a number may differ from its prediction, or from the truth
@@ -43,7 +44,7 @@ class ShaftThresholds:
     jump: float = 6.0
     unsure: float = 0.25  # of a number; with a larger standard error it is not identifiable
     below_zero: float = 3.0  # standard errors: a number so negative shows more than friction
-    drowned: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
+    hidden: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
     better: float = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
     much_better: float = 0.5  # likewise, with a drag or a lag
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it

@@ -22,14 +22,6 @@ NAN = float("nan")
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
 HYPOTHESIS = ("probability", "position", "position_sd", "force_sd", "reasons")  # columns that are read
-RECORDED = (
-    "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
-    "sim/disturbance", "sim/joint_states",
-)  # fmt: skip
-OF_STEPS = (  # topics that show what became of the steps of a scenario
-    *RECORDED, "joint_states", "contact/hypotheses", "force_axis", "task_command",
-    "task_axes", "status", "/diagnostics",
-)  # fmt: skip
 
 
 class ForceSignal(NamedTuple):

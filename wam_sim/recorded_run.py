@@ -174,7 +174,10 @@ class RecordedRun(NamedTuple):
         return self._columns(topic, TableColumns)
 
     def _columns(self, topic: str, kind: type[Kind]) -> Kind | None:
-        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
+        name = f"{self.namespace}/{topic}"
+        if name not in self.bag.topics and self.bag.counts.get(name):
+            raise LookupError(f"{self.bag.path} has {name}, but it was not read; add it to the topics that are read")
+        columns = self.bag.topics.get(name)
         return columns if isinstance(columns, kind) and len(columns.stamp_ns) else None
 
     def messages(self, topic: str) -> Sequence[Any]:

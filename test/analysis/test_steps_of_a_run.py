@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture
 from wam_analysis.contact_list import CUT, NOT_PLACED, listed_contacts
-from wam_analysis.findings.analysis import SECTIONS_OF_STEPS, Analysis, analyse_bag, analyse_steps
+from wam_analysis.findings.analysis import SECTIONS_OF_STEPS, TOPICS_READ, Analysis, analyse_bag, analyse_steps
 from wam_analysis.findings.contact import BLIND, contact_numbers
 from wam_analysis.findings.finding import Section
 from wam_analysis.findings.force import press_findings
@@ -27,7 +27,6 @@ from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.recorded import RecordedArm, prediction_parameters, recorded_arm
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.traces import OF_STEPS, RECORDED
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
@@ -568,7 +567,7 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
 
 
 def without_truth(recording: Played) -> Played:
-    recording.without = tuple(name for name in RECORDED if name.startswith("sim/"))
+    recording.without = tuple(name for name in TOPICS_READ if name.startswith("sim/"))
     return recording
 
 
@@ -666,18 +665,25 @@ def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in OF_STEPS if not name.startswith("/")])
+@pytest.mark.parametrize("name", [name for name in TOPICS_READ if not name.startswith("/")])
 def test_missing_topic_is_said_and_nothing_is_invented(name):
     recording = Played()
     recording.without = (name,)
     summary = recording.summary()
     sections = analysed(recording.bag()).sections
-    if name in RECORDED and name not in ("sim/disturbance", "sim/joint_states"):
+    if name in ("force_command", "force_measured") or name.endswith(("contact/wrench", "contact/point")):
         assert any(name in section.lacking for section in sections)
     if name == "sim/contact/wrench":
         assert "force within 10 %: NOT EVALUATED | correct link: NOT EVALUATED" in verdict(summary)
     if name == "contact/wrench":
         assert all(math.isnan(held.estimated_accuracy.bias) for held in summary.held)
+
+
+def test_a_section_that_asks_for_a_topic_that_was_not_read_is_told_so():
+    recording = AnalysedRecording(Played().bag()._replace(counts={"/wam/motor_states": 7}))
+    with pytest.raises(LookupError, match="has /wam/motor_states, but it was not read"):
+        recording.run.joints("motor_states")
+    assert recording.run.joints("joint_sensors") is None  # it is not in the bag
 
 
 def test_empty_bag_gives_a_report():
@@ -722,16 +728,17 @@ def with_outcome(folder, *statuses: tuple[str, str, int]):
 
 
 @pytest.mark.parametrize(
-    ("last", "failure"),
+    ("first", "last", "failure"),
     [
-        (("scenario", "done", 0), ""),
-        (("scenario", "step 'lower': no contact of 1.5 N detected within 0.7 s", 2), "step 'lower': no contact"),
-        (("driver", "speed of joint4 is above its limit", 2), "speed of joint4"),
-        (("driver", "enabled", 0), ""),  # the recording ends before the scenario does
+        ("scenario", ("scenario", "done", 0), ""),
+        ("scenario", ("scenario", "step 'lower': no contact of 1.5 N within 0.7 s", 2), "step 'lower': no contact"),
+        ("scenario", ("driver", "speed of joint4 is above its limit", 2), "speed of joint4"),
+        ("scenario", ("driver", "enabled", 0), ""),  # the recording ends before the scenario does
+        ("driver", ("scenario", "step 'lower': the motion takes 3 s", 2), "step 'lower': the motion"),  # not begun
     ],
 )
-def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys, last, failure):
-    bag = with_outcome(tmp_path / "bag", ("scenario", "lower", 0), last)
+def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys, first, last, failure):
+    bag = with_outcome(tmp_path / "bag", (first, "lower", 0), last)
     with pytest.raises(SystemExit) as ended:
         main(["analyse", str(bag), "--steps"])
     assert ended.value.code == int(bool(failure))

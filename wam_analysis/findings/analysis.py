@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_analysis.findings.contact import contact_section
+from wam_analysis.findings.efficiency import efficiency_section
 from wam_analysis.findings.effort import effort_section
 from wam_analysis.findings.finding import Section, counted, shown, stated
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.force_steps import step_section
-from wam_analysis.findings.motion import friction_section
-from wam_analysis.findings.power import power_section
+from wam_analysis.findings.friction import friction_section
 from wam_analysis.findings.repetition import repetition_section, spectrum_section
 from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
 from wam_analysis.findings.stick_slip import stick_section
@@ -22,7 +22,6 @@ from wam_analysis.foreign.tables import RENAMED, UNUSED, series_of_csv, table_ba
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
-from wam_analysis.traces import OF_STEPS
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
 from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
@@ -33,9 +32,10 @@ OF_THE_START = "predicted for the parameters at the start; they were changed lat
 Progress = Callable[[str], None]
 Maker = Callable[[AnalysedRecording], Section | None]
 
-# the topics that are analysed; reading others would only cost time
-TOPICS_READ = (
-    *OF_STEPS, "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
+TOPICS_READ = (  # those for which any section asks; reading others would only cost time
+    "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
+    "sim/disturbance", "sim/joint_states", "joint_states", "contact/hypotheses", "force_axis", "task_command",
+    "task_axes", "status", "/diagnostics", "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
 )  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",
@@ -129,11 +129,11 @@ def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
     BagError
         if the bag cannot be read, or holds no step.
     """
-    bag = read(Path(path), OF_STEPS, may_lack=True)
+    bag = read(Path(path), TOPICS_READ, may_lack=True)
     found = analyse_bag(bag, lambda doing: None, namespace, sections=SECTIONS_OF_STEPS)
-    if not found.recording.steps:
+    if not (found.recording.steps or found.recording.run.outcome):
         raise BagError(
-            f"{path} is not a recording of the demonstration: it has no step of a scenario; "
+            f"{path} holds no step of a scenario; "
             f"{command('wam analyse', path)} analyses any recording, {command('wam bag info', path)} lists its topics"
         )
     return found
@@ -257,7 +257,7 @@ def _marked(section: Section, changed: Sequence[str]) -> Section:
 SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, force_section, contact_section)
 SECTIONS: tuple[Maker, ...] = (
     happened_section, steps_section, force_section, cycle_section, contact_section, stick_section, friction_section,
-    power_section, timing_section,
+    efficiency_section, timing_section,
 )  # fmt: skip
 FOREIGN_SECTIONS: tuple[Maker, ...] = (
     topics_section, step_section, repetition_section, stick_section, effort_section, spectrum_section, timing_section,

@@ -14,7 +14,7 @@ from wam_analysis.findings.tabulated import LEGENDS, Tabulated, tabulated
 from wam_analysis.table import plain
 from wam_analysis.thresholds import LAYOUT
 
-SCHEMA = 3  # of the JSON; incremented when a key changes its name or meaning
+SCHEMA = 4  # of the JSON; incremented when a key changes its name or meaning
 
 
 def text(analysis: Analysis, width: int | None = None) -> str:

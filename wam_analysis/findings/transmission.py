@@ -1,4 +1,4 @@
-"""Friction of motors and joints, as far as a recording has their torques."""
+"""Friction of motors and joints, as far as a recording shows it."""
 
 import math
 from collections.abc import Mapping
@@ -14,50 +14,56 @@ from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers
-from wam_description.arm import Arm
 from wam_sim.recorded_run import RecordedRun
 
+LACKING = "Friction and efficiency cannot be evaluated: {} in this bag."
 
-class TransmissionFindings(NamedTuple):
-    """Friction of each joint and motor, by name.
+
+class TransmissionFriction(NamedTuple):
+    """Friction of each motor and joint, by name.
 
     Attributes
     ----------
-    arm : of the recording, its motors without cogging; None if the bag has none.
-    signals : None where friction and power cannot be evaluated.
-    joints, friction : none of the motors where `drowned` states why.
-    drowned : why the motors' torque shows nothing about losses, '' if it does.
+    signals : from which it is; None where the bag lacks them.
+    motors, joints : of the motors only where their losses are known.
+    unknown : why the losses of the motors are not known, as a sentence; '' where they are.
     """
 
-    arm: Arm | None
-    signals: TransmissionSignals | None = None
+    signals: TransmissionSignals | None
+    motors: Mapping[str, Friction] = MappingProxyType({})
     joints: Mapping[str, Friction] = MappingProxyType({})
-    friction: Mapping[str, Friction] = MappingProxyType({})
-    drowned: str = ""
+    unknown: str = ""
+
+    @property
+    def with_losses(self) -> TransmissionSignals | None:
+        """The signals where they show the losses of the motors."""
+        return None if self.unknown else self.signals
 
 
-def transmission_findings(run: RecordedRun, parameters: PredictionParameters) -> TransmissionFindings:
-    """What a recording shows of motors, cables and joints."""
+def transmission_friction(run: RecordedRun, parameters: PredictionParameters) -> TransmissionFriction:
+    """What a recording shows of the friction of motors and joints."""
     arm, effects = parameters.arm, parameters.effects
-    if arm is not None and effects is not None:
+    if arm is None:
+        return TransmissionFriction(None, unknown=LACKING.format("no parameters of the arm"))
+    if effects is not None:
         arm = replace(arm, motors=effects.smooth(arm))
-    signals = None if arm is None else transmission_signals(run, arm)
-    if arm is None or signals is None or len(signals.time) < 100:
-        return TransmissionFindings(arm)
-    joints = _friction_of_joints(signals, arm)
-    if drowned := _drowned(signals, arm):
-        return TransmissionFindings(arm, signals, joints, drowned=drowned)
-    return TransmissionFindings(arm, signals, joints, _friction_of_motors(signals, arm, parameters))
+    signals = transmission_signals(run, arm)
+    if signals is None or len(signals.time) < SHAFT.fewest_signals:
+        return TransmissionFriction(None, unknown=LACKING.format("no motor_states with a load"))
+    joints = _friction_of_joints(signals)
+    if hidden := _hidden(signals):
+        return TransmissionFriction(signals, joints=joints, unknown=hidden)
+    return TransmissionFriction(signals, _friction_of_motors(signals, parameters), joints)
 
 
-def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
-    """Why the motors' torque shows nothing about losses, '' if it does.
+def _hidden(signals: TransmissionSignals) -> str:
+    """Why the motors' torque does not show their losses, '' if it does.
 
     Motors modelled as velocity sources have a huge inertia: friction would be the difference of two huge torques.
     """
-    accelerates = np.abs(np.array(arm.motors.inertia) * np.gradient(signals.velocity, signals.time, axis=0))
+    accelerates = np.abs(np.array(signals.arm.motors.inertia) * np.gradient(signals.velocity, signals.time, axis=0))
     rotors, cables = float(np.max(accelerates)), float(np.max(np.abs(signals.load)))
-    if rotors <= SHAFT.drowned * cables:
+    if rotors <= SHAFT.hidden * cables:
         return ""
     return (
         "Friction and efficiency of the motors were not measured: the rotors need up to "
@@ -66,9 +72,7 @@ def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
     )
 
 
-def _friction_of_motors(
-    signals: TransmissionSignals, arm: Arm, parameters: PredictionParameters
-) -> dict[str, Friction]:
+def _friction_of_motors(signals: TransmissionSignals, parameters: PredictionParameters) -> dict[str, Friction]:
     """Of the motors; what only the size is known of may be part of what was measured, and adds to the errors.
 
     Their torque is that of the period that ends at its stamp, and so is their velocity here.
@@ -88,7 +92,7 @@ def _friction_of_motors(
                 waves=np.hstack([_waves(signals, i, name, parameters), _unrecorded(signals, i)]),
             )
         )
-        for i, name in enumerate(arm.motors.names)
+        for i, name in enumerate(signals.arm.motors.names)
     }
 
 
@@ -118,7 +122,7 @@ def _unrecorded(signals: TransmissionSignals, motor: int) -> Numbers:
     return np.column_stack([0.5 * period * rate, interval**2 / 12.0 * np.gradient(rate, signals.time)])
 
 
-def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
+def _friction_of_joints(signals: TransmissionSignals) -> dict[str, Friction]:
     """Of the joints: torque of the cables less that on the links, at the instants at which the former was recorded.
 
     Between these it is interpolated and lacks what the cables swing by, which is more than friction changes by.
@@ -130,7 +134,7 @@ def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
         return {}
     return {
         name: _possible(identify_friction(time, velocity[:, i], free[:, i], SHAFT.joint_rest, SHAFT.window, use))
-        for i, name in enumerate(arm.joints.names)
+        for i, name in enumerate(signals.arm.joints.names)
     }
 
 

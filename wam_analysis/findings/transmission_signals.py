@@ -24,6 +24,7 @@ class TransmissionSignals(NamedTuple):
 
     Attributes
     ----------
+    arm : of the recording, its motors without cogging.
     time : (k,), s.
     angle, velocity, torque : (k, n), of the motors, rad, rad/s, N m.
     load : (k, n), torque that each motor passes on, N m.
@@ -36,6 +37,7 @@ class TransmissionSignals(NamedTuple):
     caveats : what else the motors' friction holds, or may hold, a sentence each.
     """
 
+    arm: Arm
     time: Numbers
     angle: Numbers
     velocity: Numbers
@@ -83,6 +85,7 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
         caveats = tuple(_caveats(run, float(np.mean(touched[use])) if np.any(use) else 0.0))
         use &= ~touched
     return TransmissionSignals(
+        arm=arm,
         time=stamps[rows] / 1e9,
         angle=angle[rows],
         velocity=velocity[rows],

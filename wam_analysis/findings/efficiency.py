@@ -1,11 +1,9 @@
-"""Section about power: efficiency in both directions, and the torque that backdrives each joint."""
-
-import math
-from collections.abc import Mapping
+"""Section about the efficiency in both directions, and the torque that backdrives each joint."""
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
+from wam_analysis.findings.transmission import TransmissionFriction
 from wam_analysis.findings.transmission_signals import TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.friction import Friction
@@ -15,11 +13,11 @@ from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 
 
-def power_section(recording: AnalysedRecording) -> Section | None:
+def efficiency_section(recording: AnalysedRecording) -> Section | None:
     """Efficiency of the transmission, where its losses are larger than the work that it stores."""
-    arm, signals, joints, friction, drowned = recording.motion
-    if arm is None or signals is None or drowned:
+    if (signals := recording.friction.with_losses) is None:
         return None
+    arm = signals.arm
     inertia, speed = np.array(arm.motors.inertia), signals.velocity
     acceleration = np.gradient(speed, signals.time, axis=0)
     motor = np.sum((signals.torque - inertia * acceleration) * speed, axis=1)
@@ -40,7 +38,7 @@ def power_section(recording: AnalysedRecording) -> Section | None:
             )
         elif forward.put > SHAFT.least_work:
             rows = known & (motor > 0.0) & (joint > 0.0)
-            expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
+            expected = 1.0 - float(np.sum(_losses(signals)[rows])) / float(np.sum(motor[rows]))
             expected = max(expected, 0.0)
             note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
             findings.append(Finding("efficiency, motors to links", "%", 100.0 * forward.ratio, 100.0 * expected, note))
@@ -48,31 +46,31 @@ def power_section(recording: AnalysedRecording) -> Section | None:
         if is_measured and back.put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * back.ratio, note="backdriven"))
             sentences.append(f"While backdriven, the links put {shown(back.put, 'J')} into it.")
-    findings += _backdrive(arm, friction, joints)
+    findings += _backdrive(arm, recording.friction)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
     shows = [stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%"]
-    return Section("power", "Efficiency and backdrivability", sentences, findings, (), shows)
+    return Section("efficiency", "Efficiency and backdrivability", sentences, findings, (), shows)
 
 
-def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
+def _losses(signals: TransmissionSignals) -> Numbers:
     """Power lost to friction and creep by the configured parameters, (k,), W."""
     speed, joint = np.abs(signals.velocity), np.abs(np.nan_to_num(signals.joint_velocity))
-    motors, joints = arm.motors, arm.joints
+    motors, joints = signals.arm.motors, signals.arm.joints
     loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
     loss = loss + joint @ np.array(joints.dynamic_friction) + joint**2 @ np.array(joints.viscous_friction)
-    creep = np.array([circuit.loss_per_torque for circuit in arm.circuits])
+    creep = np.array([circuit.loss_per_torque for circuit in signals.arm.circuits])
     return loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
 
 
-def _backdrive(arm: Arm, friction: Mapping[str, Friction], joints: Mapping[str, Friction]) -> list[Finding]:
+def _backdrive(arm: Arm, found: TransmissionFriction) -> list[Finding]:
     """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
     matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
     motor_per_joint = np.abs(np.linalg.inv(matrix))
-    measured = np.array([friction[name].dynamic.value for name in arm.motors.names])
+    measured = np.array([found.motors[name].dynamic.value for name in arm.motors.names])
     configured = np.array(arm.motors.dynamic_friction)
-    own = np.array([joints[name].dynamic.value if name in joints else math.nan for name in arm.joints.names])
-    found = []
+    own = np.array([found.joints.get(name, Friction()).dynamic.value for name in arm.joints.names])
+    findings = []
     for i, name in enumerate(arm.joints.names):
         turns = motor_per_joint[:, i]
         needed = turns > 1e-9
@@ -80,5 +78,5 @@ def _backdrive(arm: Arm, friction: Mapping[str, Friction], joints: Mapping[str, 
         note = "dry friction of the joint and of its motors"
         expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
         torque = by_motors + float(own[i])
-        found.append(Finding(f"{name}: backdriving torque", "N m", torque, expected, note))
-    return found
+        findings.append(Finding(f"{name}: backdriving torque", "N m", torque, expected, note))
+    return findings

@@ -1,4 +1,4 @@
-"""Section about the transmission: friction."""
+"""Section about the friction of motors and joints."""
 
 import math
 
@@ -17,22 +17,21 @@ MORE = "record different motions, slow and fast, in both directions, over a turn
 
 def friction_section(recording: AnalysedRecording) -> Section:
     """Friction of motors and joints, next to what is configured."""
-    arm, signals, joints, friction, drowned = recording.motion
-    if arm is None or signals is None:
-        why = "no parameters of the arm" if arm is None else "no motor_states with a load"
-        sentence = f"Friction and power cannot be evaluated: {why} in this bag."
+    signals, motors, joints, unknown = recording.friction
+    if signals is None:
         missing = recording.run.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
-        return Section("friction", "Friction", (sentence,), (), missing)
+        return Section("friction", "Friction", (unknown,), (), missing)
+    arm = signals.arm
     alone = signals.load_from == CABLE
     note = "with the joint's friction; " * (not alone) + f"load from the {signals.load_from}"
     findings = []
-    for i, (name, found) in enumerate(friction.items()):
+    for i, (name, found) in enumerate(motors.items()):
         findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
     for i, (name, found) in enumerate(joints.items()):
         bearing = arm.joints
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
         findings += _friction_findings(name, found, configured, "cable torque less strain")
-    sentences, every = [], {**friction, **joints}
+    sentences, every = [], {**motors, **joints}
     unsure = [_named(name, kind) for name, one in every.items() for kind in UNITS if getattr(one, kind).is_vague]
     if unsure:
         sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
@@ -42,8 +41,8 @@ def friction_section(recording: AnalysedRecording) -> Section:
         )
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)
-    stated = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)
-    return Section("friction", "Friction", stated, findings, lacking, (), flagged)
+    stated = (*[unknown][: bool(unknown)], *signals.caveats, *sentences, *flagged)
+    return Section("friction", "Friction", stated, findings, lacking, flagged)
 
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
