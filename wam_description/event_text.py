@@ -18,10 +18,9 @@ REASONS: Final = {
     Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
     Reason.ELBOW: "torque of the elbow near 0: contacts near the elbow and on the inner link cannot be distinguished",
     Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
-    Reason.LINKS: "the torques do not identify the link",
+    Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "a force parallel to this link explains the torques, too; of such a force they show neither the "
-    "position nor the link",
+    Reason.ALONG: "the force may also act along this link: then the torques show neither its position nor the link",
     Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is 1 minus the sum of those "
     "of the links",
     Reason.TOO_EARLY: "too few samples so far",

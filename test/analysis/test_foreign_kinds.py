@@ -216,6 +216,19 @@ def still() -> list[Case]:
     ]
 
 
+def brief_rests() -> list[Case]:
+    """A joint that moves back and forth in 1 s each, or ten times as fast, and rests for 0.4 s of that between."""
+
+    def resting(write: Any, rate: float, faster: float, told: str) -> Case:
+        phase = np.arange(0.0, 14.0, faster / rate) % 1.4
+        way = np.where(np.arange(len(phase)) * faster / rate % 2.8 < 1.4, 1.0, -1.0)
+        position = 0.3 * way * np.cos(math.pi * np.minimum(phase, 1.0))
+        sent = joints("/joint_states", np.arange(len(phase)) / rate, ["a"], position=position[:, None])
+        return Case(f"{faster:g}", write, sent, {}, "", NOTHING, (f"a: never at rest for {told} s or more.",))
+
+    return [resting(by_rosbags, 100.0, 1.0, "0.505"), resting(sqlite, 1000.0, 10.0, "0.0505")]
+
+
 def zeros() -> list[Case]:
     def moved(at: float, by: float, rate: float) -> Any:
         return lambda q: q + by * (np.arange(len(q)) / rate > at)
@@ -301,25 +314,26 @@ def wrong_efforts() -> list[Case]:
 
 
 def other_units() -> list[Case]:
-    def scaled(quantity: str, by: float, write: Any, told: str) -> Case:
+    def scaled(quantity: str, by: float, write: Any, *units: str) -> Case:
         sent = one("/joint_states", 100.0, 0.7, 0.5)
         sent = [s._replace(fields=s.fields | {quantity: by * s.fields[quantity]}) for s in sent]
-        return Case(quantity, write, sent, {}, f"if it is in {told}, give --unit {quantity}={told}")
+        told = " or ".join(f"--unit {quantity}={unit}" for unit in units)
+        return Case(quantity, write, sent, {}, f"if it is in another one, give {told}.")
 
     degree = 180.0 / math.pi
     slow = one("/joint_states", 100.0, 0.7, 5.0)  # of 5 degrees
     alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
     return [
         Case("position alone", by_rosbags, alone, {}, "if its position is in deg, give --unit position=deg"),
-        scaled("position", degree, ros1, "deg"),
-        scaled("velocity", degree, sqlite, "deg/s"),
-        scaled("effort", 1e3, by_rosbags, "mA"),
+        scaled("position", degree, ros1, "deg", "mm"),
+        scaled("velocity", degree, sqlite, "deg/s", "rpm", "mm/s"),
+        scaled("effort", 1e3, by_rosbags, "mN", "mNm", "mA"),
     ]
 
 
 KINDS = (
     unfilled, held_over, wrong_efforts, other_units, wraps, sparse, coarse, twice, names, called_as_commands,
-    few_cycles, still, zeros, contradictions, formats,
+    few_cycles, still, brief_rests, zeros, contradictions, formats,
 )  # fmt: skip
 CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
 

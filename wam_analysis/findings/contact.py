@@ -113,8 +113,7 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
         yield f"{name}: {cut}."
     if contact.estimate.lasting < TOUCH.steady_link:
         yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
-    if contact.estimate.reasons:
-        yield f"{name}: {'; '.join(contact.estimate.reasons)}."
+    yield from (f"{name}: {reason}." for reason in contact.estimate.reasons)
     if contact.true not in ("", contact.estimate.link):
         yield f"{name}: {'nothing was' if contact.true == NO_LINK else f'{contact.true} was'} touched."
 

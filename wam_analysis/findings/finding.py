@@ -112,12 +112,3 @@ def counted(number: int, name: str) -> str:
 def times(number: int) -> str:
     """How often, in words: 'once', '3 times', 'never'."""
     return {0: "never", 1: "once"}.get(number, f"{number} times")
-
-
-def rest_words(stuck: float, motions: int) -> str:
-    """How a shaft moved: the fraction of the time at rest, and its motions between."""
-    if not motions:
-        return "never moved"
-    if not stuck and motions == 1:
-        return "never at rest"
-    return f"at rest for {100.0 * stuck:.0f} % of the time, moved {times(motions)}"

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, rest_words, shown
+from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.recording import AnalysedRecording
@@ -33,7 +33,7 @@ def stick_section(recording: AnalysedRecording) -> Section:
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
             Finding(f"{one.label}: slips", "", float(found.slips)),
         ]
-        sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
+        sentence = f"{one.label}: {found.words}"
         if recording.is_foreign and found.stuck and 0 < found.slips == len(found.begins):  # ours have the arm's time
             begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.begins]] + ["..."] * (found.slips > LAYOUT.begins)
             sentence += f" (from {', '.join(begins)} s)"
@@ -54,12 +54,23 @@ class Sticking(NamedTuple):
     slips : motions between; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
     begins : when each motion began, s; none of a motion back and forth.
+    shortest : rest that is counted, s.
     """
 
     stuck: float
     slips: int
     commanded: float
     begins: tuple[float, ...] = ()
+    shortest: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """How much of the time it was at rest, and how often it moved."""
+        if not self.slips:
+            return "never moved"
+        if not self.stuck and self.slips == 1:
+            return f"never at rest for {shown(self.shortest, 's')} or more"
+        return f"at rest for {100.0 * self.stuck:.0f} % of the time, moved {times(self.slips)}"
 
 
 def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
@@ -67,18 +78,25 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if rests(source):
         return Sticking(1.0, 0, math.nan)
     still = slips = total = disobeyed = 0
+    shortest = 0.0
     begins: list[float] = []
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
         rest = rest_speed(piece, least)
         period = float(piece.time[1] - piece.time[0])
-        phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(SHAFT.shortest_phase / period)))
+        least_rows = max(1, round(SHAFT.shortest_phase / period))
+        phases = stick_slip_phases(piece.values["velocity"], rest, least_rows)
         total += len(piece.time)
         if _only_turns(phases, piece.values["velocity"]):
             slips += 1
-            lengths = np.diff(phases.sticks, axis=1)
-            still += int(np.sum(lengths[lengths > SHAFT.brief * np.median(np.diff(phases.slips, axis=1))]))
+            lengths, brief = (
+                np.diff(phases.sticks, axis=1),
+                SHAFT.brief * float(np.median(np.diff(phases.slips, axis=1))),
+            )
+            still += int(np.sum(lengths[lengths > brief]))
+            shortest = max(shortest, brief * period)
             continue
+        shortest = max(shortest, least_rows * period)
         phases = without_turns(phases, piece.values["velocity"], rest)
         still += round(phases.stuck * len(piece.time))
         slips += len(phases.slips)
@@ -89,7 +107,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if not total:
         return None
     unmet = disobeyed / still if command is not None and still else math.nan
-    return Sticking(still / total, slips, unmet, tuple(begins))
+    return Sticking(still / total, slips, unmet, tuple(begins), shortest)
 
 
 def hidden_motion(source: Source) -> float:

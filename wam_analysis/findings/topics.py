@@ -7,14 +7,13 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, counted, shown, times
 from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
-from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
+from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
 
-UNUSUAL = {  # values that few robots reach, in the unit of ROS, and many in another one
-    "position": (4.0 * math.pi, "deg"), "velocity": (4.0 * math.pi, "deg/s"), "effort": (400.0, "mA"),
-    "force": (1e4, "mN"), "torque": (1e3, "mNm"),
+UNUSUAL = {  # values in the unit of ROS that few robots reach
+    "position": 4.0 * math.pi, "velocity": 4.0 * math.pi, "effort": 400.0, "force": 1e4, "torque": 1e3,
 }  # fmt: skip
 
 
@@ -32,7 +31,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-        wrong += _unusual(name, columns, given)
+        wrong += _unsmaller(name, columns, given)
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
@@ -59,19 +58,22 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
 
 
-def _unusual(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
+def _unsmaller(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
     """Which values may be in another unit than that of ROS."""
-    for quantity, (most, other) in UNUSUAL.items():
+    for quantity, most in UNUSUAL.items():
         values = np.abs(getattr(columns, quantity, np.empty(0)))
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
         if largest > most and quantity not in given.units:
             taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, if read in the unit of ROS"
-            yield f"{name}: {taken}; if it is in {other}, give --unit {quantity}={other}."
+            smaller = {one: unit for unit, one in reversed(UNITS.items())
+                     if one[1] in QUANTITIES[quantity] and one[0] < 1.0}  # fmt: skip
+            units = " or ".join(f"--unit {quantity}={unit}" for unit in reversed(smaller.values()))
+            yield f"{name}: {taken}; if it is in another one, give {units}."
 
 
 def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
     """Which joints would move faster than few do, where their velocity was not recorded."""
-    most, _ = UNUSUAL["velocity"]
+    most = UNUSUAL["velocity"]
     for one in found:
         if _lacks_velocity(one) and "position" not in given.units:
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
