@@ -39,10 +39,6 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     ),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),
-    "pinned_place": (
-        "the contact position",
-        "bend the arm, or lower contact_position_sd if the position is known better",
-    ),
     "resting": (
         "a load that is not in the model",
         "end the command and tare in free space ('wam call tare'), or declare the load of a real arm (arm.payload)",
@@ -51,6 +47,11 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     "slow_arm": ("the slow approach to this force", "declare guard.contact_stiffness, or raise limits.settling_time"),
     "shaking_arm": ("the vibration of the arm", "use joint sensors, or declare guard.contact_stiffness"),
 }
+INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
+    ("torques", "sensors"): "tare in free space, or command fewer forces at once",
+    ("place", "pinned"): "bend the arm, or lower contact_position_sd if the position is known better",
+}
+UNKNOWN: Final = "{desired:.3g} {unit} at {where} cannot be controlled because of {part_text}"
 UNCERTAIN: Final = (
     "{desired:.3g} {unit} at {where} may be wrong by {error:b} {unit}, mostly because of {part_text}; allowed: "
     "{allowed:b} {unit} (limits.tolerance)"
@@ -113,7 +114,7 @@ SINCE: Final = ("without a contact", "since the force was last right or rising")
 
 
 class _Sentence(string.Formatter):
-    """Format as str.format does; `b` writes a number briefly, and one without a bound in words.
+    """Format as str.format does; `b` writes a number briefly.
 
     Parameters
     ----------
@@ -124,9 +125,7 @@ class _Sentence(string.Formatter):
         self._digits = digits
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        if format_spec != "b":
-            return str(super().format_field(value, format_spec))
-        return "any number of" if value == math.inf else brief(value, self._digits)
+        return brief(value, self._digits) if format_spec == "b" else str(super().format_field(value, format_spec))
 
 
 def sentence(event: Event) -> str:
@@ -136,7 +135,10 @@ def sentence(event: Event) -> str:
         return str(event.values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
     values = {**event.values, **_parts(event.values)}
     end = HOLDING if event.holds and "hold" not in SENTENCES[cause] and "goes back" not in SENTENCES[cause] else ""
-    return _Sentence(_digits(event.values)).vformat(SENTENCES[cause], (), values) + end
+    text = SENTENCES[cause]
+    if values.get("error") == math.inf:
+        text = text.replace(UNCERTAIN, UNKNOWN)
+    return _Sentence(_digits(event.values)).vformat(text, (), values) + end
 
 
 def _digits(values: Mapping[str, Any]) -> int:
@@ -160,6 +162,7 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     found = {"since": SINCE[values.get("has_touched", 0.0) > 0.0]}
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
+        helps = INSTEAD.get((values["part"], values["source"]), helps)
         is_joint = math.isnan(values["position"])
         where = values["cover"] if is_joint else f"{values['position']:.3g} m of {values['cover']}"
         found |= {"part_text": part, "part_help": helps, "where": where, "help": _help(values, helps)}

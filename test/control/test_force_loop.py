@@ -14,6 +14,7 @@ from wam_control.task.motion import GoalMotion
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
@@ -434,7 +435,7 @@ def test_on_a_surface_stiffer_than_the_gain_allows_the_force_does_not_jump() -> 
     [
         ({"sensing": replace(OWN.sensing, torque_sd=1.0)}, "torques"),
         ({"contact_position_sd": 0.3}, "friction"),  # with other levers at other places
-        ({"contact_position_sd": 0.1, "sensing": replace(OWN.sensing, friction=2.0)}, "pinned_place"),
+        ({"contact_position_sd": 0.1, "sensing": replace(OWN.sensing, friction=2.0)}, "place"),
         ({"limits": replace(FREE, doubt=1.0, surface_speed=0.1)}, "moving_surface"),
         ({"limits": replace(FREE, doubt=1.0, settling_time=1e-3)}, "slow_arm"),
     ],
@@ -447,6 +448,7 @@ def test_a_force_that_would_be_off_by_more_than_tolerated_is_refused_and_the_arm
     out = moved(loop, world, 8.0, 20)
     assert (loop.event.code, loop.event.holds, loop.event.cause) == (Code.REFUSED, True, "error")
     assert loop.event.values["part"] == part
+    assert "use joint sensors" not in sentence(loop.event), "they are used"
     assert world.q == pytest.approx(POSE, abs=1e-9)
     assert loop.refusals["force_command"] == loop.event
     assert not any(out.effort)

@@ -214,12 +214,12 @@ class ForceWatch:
             self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
         is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
         self._is_decided = self._is_decided or (is_there and not self._is_refused)
-        part = known.errors.cause
-        if part == "place" and place is not None and place.is_pinned:
-            part = "pinned_place"
+        part, source = known.errors.cause, "motors" if own.is_estimated else "sensors"
+        if part == "place" and place is not None:
+            source = "pinned" if place.is_pinned else "estimated"
         values: dict[str, Value] = {
-            "error": known.errors.size, "part": part, "desired": axis.desired, "allowed": known.tolerance,
-            "unit": _unit(axis), "cover": place.cover if place else axis.of.name,
+            "error": known.errors.size, "part": part, "source": source, "desired": axis.desired,
+            "allowed": known.tolerance, "unit": _unit(axis), "cover": place.cover if place else axis.of.name,
             "position": place.position if place else math.nan,
         }  # fmt: skip
         if self._is_refused:
