@@ -42,7 +42,7 @@ from wam_ros.bring_up import Composition, Processes
 from wam_ros.messages import joint_state
 from wam_ros.ros_topics import qos, stamp_of
 from wam_ros.run import Connection
-from wam_ros.wire import stamp_of as stamp_in
+from wam_ros.wire import stamp_in
 from wam_sim.simulation import Simulation
 
 Readings = list[tuple[float, int]]  # wall clock in s, the arm's time in ns

@@ -121,7 +121,7 @@ class Configuration(NamedTuple):
                         else f"it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
                     )
                 )
-            flat[parameter] = like(flat.get(parameter), value)
+            flat[parameter] = shaped_like(flat.get(parameter), value)
         return Configuration(self.path, _frozen(sections))
 
     def _meant(self, key: str) -> str:
@@ -325,7 +325,7 @@ def _folders() -> Iterator[Path]:
         yield prefix / "share" / "wam_stack" / "config"
 
 
-def like(present: Any, value: Any) -> Any:
+def shaped_like(present: Any, value: Any) -> Any:
     """A new value in the place of a present one: in that of a list, a number is each of its values."""
     if isinstance(present, list | tuple) and isinstance(value, int | float) and not isinstance(value, bool):
         return [value] * max(len(present), 1)

@@ -14,7 +14,7 @@ from wam_description.topics import BY_NAME
 from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused
 from wam_ros.ros_topics import NAMESPACE, header, qos
-from wam_ros.wire import decoder, stamp_of
+from wam_ros.wire import decoder, stamp_in
 
 
 class FramesNode(Node):
@@ -44,7 +44,7 @@ class FramesNode(Node):
         self.create_subscription(JointState, "joint_states", self._take, qos(BY_NAME["joint_states"]), raw=True)
 
     def _take(self, data: bytes) -> None:
-        stamp = stamp_of(data)
+        stamp = stamp_in(data)
         if 0 <= stamp - self._last < self._period:
             return
         try:

@@ -27,7 +27,7 @@ from wam_ros.messages import message_type
 from wam_ros.requests import answer_of
 from wam_ros.ros_topics import qos
 from wam_ros.run import Connection
-from wam_ros.wire import stamp_of
+from wam_ros.wire import stamp_in
 
 
 class LivePage:
@@ -174,7 +174,7 @@ class ShownStack:
     def _answer(self, state: bytes) -> None:
         if self._press is None:
             return
-        if refusal := self._force.send(stamp_of(state), Wrench(*self._press, (0.0, 0.0, 0.0))):
+        if refusal := self._force.send(stamp_in(state), Wrench(*self._press, (0.0, 0.0, 0.0))):
             self._press = None
             self.panel.notify(f"not pressed: {refusal}", refused=True)
 

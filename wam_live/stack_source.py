@@ -18,7 +18,7 @@ from wam_live.snapshot import NAN, Snapshot, objects_of, size
 from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, message_type
 from wam_ros.outlets import NEWEST, copy_name
-from wam_ros.wire import decoder, stamp_of
+from wam_ros.wire import decoder, stamp_in
 
 VIEWED: Final = sorted(topic.name for topic in BY_NAME.values() if topic.is_viewed)
 TOPICS: Final = (*VIEWED, "force_command")  # of which everybody may be the publisher
@@ -56,7 +56,7 @@ class RunningStack:
         for name, subscription in self._topics.items():
             if (data := _taken(subscription)) is not None:
                 try:
-                    self._newest[name], self._stamps[name] = self._decoders[name](data), stamp_of(data)
+                    self._newest[name], self._stamps[name] = self._decoders[name](data), stamp_in(data)
                 except Refused:
                     continue
         truth = self._newest.get("sim/joint_states")

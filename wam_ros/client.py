@@ -26,7 +26,7 @@ from wam_ros.requests import Request, answer_of, service_request
 from wam_ros.ros_topics import NAMESPACE, listening, qos
 from wam_ros.run import Closing, Connection
 from wam_ros.tolerance import LeavingNode
-from wam_ros.wire import decoder, encoder, stamp_of, status_of
+from wam_ros.wire import decoder, encoder, stamp_in, status_of
 
 MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
 START: Final = "start the stack with 'wam up'"
@@ -248,7 +248,7 @@ class StackClient(Closing):
 
         def receive(data: bytes) -> None:
             with suppress(Refused):
-                take(stamp_of(data), decode(data))
+                take(stamp_in(data), decode(data))
 
         self.node.create_subscription(message_type(row), topic, receive, listening(row), raw=True)
 

@@ -25,7 +25,7 @@ from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import diagnostic_status, joint_state, message_type
 from wam_ros.ros_topics import DIAGNOSTICS, NAMESPACE, qos, topic_name
-from wam_ros.wire import stamp_of
+from wam_ros.wire import stamp_in
 
 KEPT = ("motor_states", "motor_currents", "/clock")
 COMMAND = "motor_current_command"
@@ -102,7 +102,7 @@ class DriverBench(StackClient):
 
     def _keeping(self, topic: str, kind: Any) -> Callable[[bytes], None]:
         def keep(data: bytes) -> None:
-            stamp, message = stamp_of(data), deserialize_message(data, kind)
+            stamp, message = stamp_in(data), deserialize_message(data, kind)
             self.arrived[topic].append(Arrived(time.monotonic(), stamp, message))
             if topic == "motor_states":
                 self._answer(stamp, message)

@@ -15,7 +15,7 @@ from wam_ros.local_bus import LocalBus
 from wam_ros.messages import Refused, message_type
 from wam_ros.ros_topics import listening, topic_name
 from wam_ros.tolerance import TolerantNode
-from wam_ros.wire import decoder, stamp_of
+from wam_ros.wire import decoder, stamp_in
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
 
@@ -125,7 +125,7 @@ class Inlets:
                 # what a second publisher sends does not come by the bus
                 if (topic in problems or (not is_local and claim.count > 1)) and (rivals := self._look(topic)):
                     raise Refused(sentence(rivals))
-                stamp = stamp_of(data)
+                stamp = stamp_in(data)
                 if accepts(stamp):
                     take(stamp, decode(data))
             except Refused as reason:

@@ -31,7 +31,7 @@ from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
-from wam_ros.wire import decoder, stamp_of
+from wam_ros.wire import decoder, stamp_in
 
 _EMPTY: Final[Mapping[str, Any]] = {
     JOINT_STATE: State([], [], []),
@@ -169,7 +169,7 @@ class RunningArm:
 
         def take(data: bytes) -> None:
             kept.append(data)
-            self._stream(stamp_of(data))
+            self._stream(stamp_in(data))
 
         return take if topic == "joint_states" else kept.append
 
@@ -317,7 +317,7 @@ class RunningArm:
         """
         self.publisher(topic)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
-        stamp = stamp_of(states[-1]) if states else 0
+        stamp = stamp_in(states[-1]) if states else 0
         self._streams[topic] = stamp + round(seconds * SECOND), self.value(topic, **fields) if value is None else value
         self._stream(stamp, topic)
 

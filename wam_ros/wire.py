@@ -34,7 +34,7 @@ Decode = Callable[[bytes], Any]
 Numbers = list[Any]  # groups of them
 
 
-def stamp_of(data: bytes) -> int:
+def stamp_in(data: bytes) -> int:
     """Stamp of a serialized message with a header, ns; 0 where it is too short to have one."""
     return first_stamp(data) or 0
 

@@ -10,7 +10,7 @@ from wam_bag import safe_yaml
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_description.arm import Shared
-from wam_description.configuration import PARAMETERS, like
+from wam_description.configuration import PARAMETERS, shaped_like
 from wam_description.interface import declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part, dotted, fields, require
@@ -99,7 +99,7 @@ class RecordedParameters(NamedTuple):
             who = f"node '{node}' has no" if colon else "no node has"
             reason = f"{who} parameter '{name}' in {self.source}; write [node:]parameter=value"
             require(bool(owners), f"--set {key}: {reason}")
-            settings |= {f"{own}:{name}": like(self.nodes[own][name], value) for own in owners}
+            settings |= {f"{own}:{name}": shaped_like(self.nodes[own][name], value) for own in owners}
         changed = self.with_values(settings)
         for node in {key.partition(":")[0] for key in settings} & NODES.keys():
             for cls in (Shared, declared(node).parameter_class):

@@ -21,9 +21,8 @@ from wam_description.event import Level
 from wam_description.signals import NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_ros.messages import Refused, diagnostic_status, joint_state, message_type, read_status, reader
-from wam_ros.ros_topics import header
-from wam_ros.ros_topics import stamp_of as stamp_of_message
-from wam_ros.wire import decoder, encoder, stamp_of, status_of
+from wam_ros.ros_topics import header, stamp_of
+from wam_ros.wire import decoder, encoder, stamp_in, status_of
 
 SHARED = Configuration.load(packaged("wam")).shared
 NAMES = list(SHARED.arm.motors.names)
@@ -85,7 +84,7 @@ def test_a_value_is_the_same_to_the_bit_by_either_path(topic: Topic) -> None:
         value = value_of(topic, rng)
         data = encode(STAMP, value)
         message = deserialize_message(data, message_type(topic))
-        assert stamp_of(data) == stamp_of_message(message) == STAMP
+        assert stamp_in(data) == stamp_of(message) == STAMP
         for received in (data, bytes(serialize_message(message)), data + bytes(16)):
             assert repr(decode(received)) == repr(value)
         assert repr(reference(data)) == repr(value)
@@ -95,7 +94,7 @@ def test_a_value_is_the_same_to_the_bit_by_either_path(topic: Topic) -> None:
 def test_stamps_are_kept_to_the_nanosecond(stamp: int) -> None:
     clock = encoder(BY_NAME["/clock"], SHARED)(stamp, None)
     assert clock == bytes(serialize_message(Clock(clock=header(stamp).stamp)))
-    assert stamp_of(encoder(BY_NAME["motor_states"], SHARED)(stamp, STATE)) == stamp
+    assert stamp_in(encoder(BY_NAME["motor_states"], SHARED)(stamp, STATE)) == stamp
 
 
 @pytest.mark.slow
@@ -130,7 +129,7 @@ def test_option_bits_of_the_encapsulation_do_not_change_the_value(topic: Topic, 
     data = encoder(topic, SHARED)(STAMP, value)
     decode = decoder(topic, SHARED, ANY)
     assert repr(decode(data[:2] + options + data[4:])) == repr(decode(data)) == repr(value)
-    assert stamp_of(data[:2] + options + data[4:]) == STAMP
+    assert stamp_in(data[:2] + options + data[4:]) == STAMP
 
 
 def decoded(topic: str, message: Any, arrays: str = ANY) -> Any:
@@ -220,7 +219,7 @@ def test_what_is_no_message_is_refused(data: bytes) -> None:
     for topic in NUMBERS:
         with pytest.raises(Refused):
             decoder(topic, SHARED, "effort")(data)
-        assert isinstance(stamp_of(data), int)
+        assert isinstance(stamp_in(data), int)
 
 
 def table_of(topic: str, rows: int) -> bytes:

@@ -22,7 +22,7 @@ from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.messages import message_type
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, qos
-from wam_ros.wire import stamp_of
+from wam_ros.wire import stamp_in
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
@@ -115,10 +115,10 @@ class WatchedStack(StackClient):
             except Exception:
                 return
             self._newest[topic] = data
-            if topic == "motor_current_command" and stamp_of(data) >= self.driver.stamp:
+            if topic == "motor_current_command" and stamp_in(data) >= self.driver.stamp:
                 self._clock.advance()
             if topic == "joint_states":
-                self._command(stamp_of(data))
+                self._command(stamp_in(data))
             bad = [leaf.name for leaf in leaves(message) if leaf.is_real and np.any(is_wrong(leaf.value))]
             if bad:
                 self._escape(f"{topic} has {bad[0]} not finite")
