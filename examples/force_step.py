@@ -46,10 +46,12 @@ class ForceStep(Node):
         self.last = time.monotonic()
 
     def take_contact(self, message: WrenchStamped) -> None:
+        """Keep the size of the estimated contact force, N."""
         force = message.wrench.force  # of the world on the link
         self.touch = (force.x**2 + force.y**2 + force.z**2) ** 0.5
 
     def take_status(self, message: DiagnosticStatus) -> None:
+        """Keep why the force loop refuses a command; end where the arm is no longer enabled."""
         facts = {item.key: item.value for item in message.values}
         if message.name == "force_loop":  # where it does not obey a command, its message is the reason
             self.refusal = message.message if COMMANDS.intersection(facts.get("refused", "").split(", ")) else ""
@@ -63,9 +65,11 @@ class ForceStep(Node):
             sys.exit("another program put on the brakes; start again")
 
     def take_measured(self, message: WrenchStamped) -> None:
+        """Keep the measured force of the arm along the commanded one, N."""
         self.measured = -message.wrench.force.y  # of the arm on the world
 
     def take_joints(self, message: JointState) -> None:
+        """Answer a state of the arm with a posture and a force."""
         position = dict(zip(message.name, message.position, strict=True))
         self.last = time.monotonic()
         self.q = [position[f"joint{i}"] for i in (1, 2, 3, 4)]  # by name, never by index
@@ -81,6 +85,7 @@ class ForceStep(Node):
         self.force.publish(force)
 
     def play(self) -> Iterator[None]:
+        """Enable the arm, press twice and go back; each `yield` waits for the next state."""
         self.wanted = list(self.q)
         yield from self.ask(True)
         yield from self.move(ABOVE, 2.0)
@@ -101,6 +106,7 @@ class ForceStep(Node):
         yield from self.ask(False)
 
     def ask(self, on: bool) -> Iterator[None]:
+        """Enable or brake the arm."""
         while not self.enable.service_is_ready():
             yield
         answer = self.enable.call_async(SetBool.Request(data=on))
@@ -122,6 +128,7 @@ class ForceStep(Node):
 
 
 def main() -> None:
+    """Run the node until it has played all steps."""
     rclpy.init()
     node = ForceStep()
     while not node.is_done:
