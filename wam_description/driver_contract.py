@@ -89,7 +89,7 @@ REQUIREMENTS: Final = {
         "compare the newest state with the stamp of the last command in every period",
     ),
     "repetition": Requirement(
-        "faults also if new commands have the stamp of the same old state",
+        "faults also if commands arrive, but all have the stamp of one old state",
         "let the watchdog use the stamp of the command, not only its arrival",
     ),
     "fault": Requirement(

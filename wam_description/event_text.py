@@ -10,8 +10,8 @@ from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
 
 REASONS: Final = {
-    Reason.MOMENT_ONLY: "only the moment is measured on this link: the contact position is unknown, the force is a "
-    "lower bound",
+    Reason.MOMENT_ONLY: "on this link only the moment is measured, so the contact position is unknown and the force is "
+    "a lower bound",
     Reason.BENT: "elbow at 90 deg and force in plane: contact position and force cannot be separated",
     Reason.STRAIGHT: "elbow straight and force out of plane: contact position and force cannot be separated",
     Reason.SHOULDER: "in this pose, one moment at the shoulder is not measured",

@@ -32,12 +32,14 @@ def friction_section(recording: AnalysedRecording) -> Section:
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
         findings += _friction_findings(name, found, configured, "cable torque less strain")
     sentences, every = [], {**motors, **joints}
-    unsure = [_named(name, kind) for name, one in every.items() for kind in UNITS if getattr(one, kind).is_vague]
+    unsure = [
+        f"{kind} friction of {name}" for name, one in every.items() for kind in UNITS if getattr(one, kind).is_vague
+    ]
     if unsure:
-        sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
+        sentences.append(f"This recording does not determine {', '.join(unsure)}: {MORE}.")
     if still := [name for name, one in every.items() if math.isnan(one.dynamic.value)]:
         sentences.append(
-            f"Friction not found of {', '.join(still)}: too little motion, or not all of the torque is friction."
+            f"No friction found for {', '.join(still)}: too little motion, or not all of the torque is friction."
         )
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)

@@ -48,9 +48,9 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "
     "`contact_position` is in m along the cover, `newtons` in its frame. Optional: `begin` and `end`, s from the start "
     "of the step",
-    "request": "`enable` or `disable`, or `tare` of an arm at rest, at the start of the step",
-    "set": "`{force_loop: {force_gain: [0.01]}}`: sets parameters of driver or force_loop at the start of the step, "
-    "those that may change while the node runs (*live* parameters)",
+    "request": "called at the start of the step: `enable`, `disable`, or `tare` if the arm is at rest",
+    "set": "`{force_loop: {force_gain: [0.01]}}`: sets *live* parameters of driver or force_loop at the start of the "
+    "step; these may change while the node runs",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
