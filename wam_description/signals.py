@@ -1,7 +1,7 @@
 """The values that nodes exchange, without time stamps: the same on topics, in the simulation and in a replay."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wam_description.event import Event, Level
 
@@ -180,6 +180,11 @@ class NodeStatus(NamedTuple):
     stamp: int = 0
     facts: Mapping[str, str] = {}
     events: tuple[Event, ...] = ()
+
+    @property
+    def subjects(self) -> set[tuple[Any, ...]]:
+        """What the status is about; one that only changes in its numbers is stated to people once."""
+        return {event.subject for event in self.events} or {(self.level,)}
 
 
 class Answer(NamedTuple):

@@ -202,7 +202,7 @@ class AdaptedNode(StackNode):
         if status.level is Level.ERROR:
             self.get_logger().error(status.message)
         elif status.level is Level.WARN:
-            if before is WAITING or not _subjects(status) <= _subjects(before):
+            if before is WAITING or not status.subjects <= before.subjects:
                 refused = f"{status.facts[REFUSED]}: refused: " if REFUSED in status.facts else ""
                 self.get_logger().warning(refused + status.message)
         elif status.step:
@@ -270,11 +270,6 @@ class AdaptedNode(StackNode):
         self.get_logger().error(refusal)
         if refused := getattr(self.node, "refused", None):
             self._publish(0, refused(refusal))
-
-
-def _subjects(status: NodeStatus) -> set[tuple[Any, ...]]:
-    """What a status is about: one that only changes in its numbers is logged once."""
-    return {event.subject for event in status.events} or {(status.level,)}
 
 
 def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:

@@ -33,11 +33,6 @@ WITHOUT_EFFECT = frozenset(  # in a direct run: it is in lockstep, as fast as it
 )
 
 
-def _warn(node: str, status: NodeStatus) -> None:
-    if status.level is Level.WARN:
-        logging.getLogger("wam_sim").warning("warning: %s: %s", node, status.message)
-
-
 class Simulation:
     """The nodes of a configuration around the simulated arm, in lockstep.
 
@@ -80,6 +75,7 @@ class Simulation:
         self._publish_states = self._bus.publisher("motor_states")
         self._currents: tuple[int, list[float]] = (0, [])
         self._reported: tuple[Mode, tuple[Event, ...]] | None = None
+        self._warned: dict[str, set[tuple[Any, ...]]] = {}  # of each node, what its last status was about
         self._steps = steps
         self._begins: list[int] = []  # of the steps, ns
         self._events: list[tuple[int, tuple[Event, ...]]] = []  # of the force loop, each time these change
@@ -109,7 +105,13 @@ class Simulation:
         if hasattr(node, "requests"):
             feeds = {t: [feed._replace(work=self._requesting(node, feed.work)) for feed in feeds[t]] for t in feeds}
         self._bus.connect(declaration, feeds, self._interface.checks(declaration))
-        self.listen(STATUS, lambda _, status: _warn(name, status), name)
+        self.listen(STATUS, lambda _, status: self._warn(name, status), name)
+
+    def _warn(self, node: str, status: NodeStatus) -> None:
+        is_known = status.subjects <= self._warned.get(node, set())
+        self._warned[node] = status.subjects
+        if status.level is Level.WARN and not is_known:
+            logging.getLogger("wam_sim").warning("warning: %s: %s", node, status.message)
 
     def _requesting(self, node: Any, work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
         """The step of a node together with its requests to others."""
