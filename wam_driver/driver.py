@@ -347,15 +347,9 @@ class Driver:
         """The simulator's largest load on a cover."""
         return max(self.plant.loads(), key=lambda load: sum(f * f for f in load.force), default=NO_LOAD)
 
-    @property
-    def true_objects(self) -> Table | None:
-        """The simulator's state of every free body, door and moving obstacle; None where there are none."""
-        states = self.plant.objects()
-        return Table(BASE, tuple(states)) if states else None
-
     def outer_values(self) -> dict[str, State | Wrench | Point | Table]:
         """What is published in an outer period by topic: the currents, and what only a simulator knows."""
-        load, objects = self.true_contact, self.true_objects
+        load, objects = self.true_contact, self.plant.objects()
         frame = load.cover or BASE
         found: dict[str, State | Wrench | Point | Table] = {
             "motor_currents": State([], [], list(self.currents)),
@@ -363,4 +357,4 @@ class Driver:
             "sim/contact/wrench": Wrench(frame, load.force, load.moment),
             "sim/contact/point": Point(frame, (load.position, 0.0, 0.0)),
         }
-        return found if objects is None else {**found, "sim/objects": objects}
+        return {**found, "sim/objects": Table(BASE, tuple(objects))} if objects else found

@@ -18,17 +18,18 @@ class WatchedLimit(NamedTuple):
     unit: str
     where: str = ""
 
+    def _in_words(self, where: str) -> str:
+        return f"{self.quantity} {self.value:.2f} {self.unit} is {where} its limit {self.limit:g}{self.where}"
+
     @property
     def warning(self) -> str:
         """The warning, in words."""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}{self.where}"
+        return self._in_words("near")
 
     @property
     def excess(self) -> str:
         """That the quantity is above its limit, which is a fault; '' while it is not."""
-        if self.value <= self.limit:
-            return ""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}{self.where}"
+        return "" if self.value <= self.limit else self._in_words("above")
 
 
 class LimitWatch:

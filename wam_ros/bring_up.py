@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -18,7 +17,7 @@ from wam_description.interface import declared, require_parameters
 from wam_description.nodes import EACH, ONE
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.network import require_places
-from wam_ros.node import make_node, parameter_file
+from wam_ros.node import node_makers, parameter_file
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
 from wam_ros.ros_topics import NAMESPACE
@@ -275,10 +274,9 @@ class Composition(Nodes):
         is_stopped: Callable[[], bool] = lambda: False,
         log_level: str = "info",
     ) -> None:
-        names = node_names(configuration)
         with parameter_file(configuration) as file:
             own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
-            makers = {name: partial(make_node, entry, **own) for entry, name in names.items()}
+            makers = node_makers(configuration.shared.nodes, **own)
             arguments = ["wam", "--ros-args", "--log-level", log_level]
             super().__init__(makers, arguments, namespace, domain_id, is_stopped)
         self._may_end = {

@@ -31,48 +31,44 @@ class ConformanceRow(NamedTuple):
         return "\n".join(lines)
 
 
-class Conformance:
-    """The rows of the contract, tested one after the other.
+def conformance_rows(bench: DriverBench, attempts: int) -> Iterator[ConformanceRow]:
+    """Test every row of the contract, each until it is right or there are no more attempts.
 
     Parameters
     ----------
     bench : in the place of the velocity loop.
-    attempts : at each row, as a computer that is busy delays a driver that is right; one in which the test itself was
-        held up does not count, and proves nothing.
+    attempts : at each row, see `conformance_row`.
     """
+    blocked = ""
+    for key in REQUIREMENTS:
+        row = ConformanceRow(key, NOT_TESTED, blocked) if blocked else conformance_row(bench, key, attempts)
+        if key == "interface" and row.verdict == WRONG:
+            blocked = "the interface is missing"
+        yield row
+    bench.brake()
 
-    def __init__(self, bench: DriverBench, attempts: int) -> None:
-        self._bench, self._attempts = bench, attempts
 
-    def rows(self) -> Iterator[ConformanceRow]:
-        """Test every row, each until it is right or there are no more attempts."""
-        blocked = ""
-        for key in REQUIREMENTS:
-            row = ConformanceRow(key, NOT_TESTED, blocked) if blocked else self.row(key)
-            if key == "interface" and row.verdict == WRONG:
-                blocked = "the interface is missing"
-            yield row
-        self._bench.brake()
+def conformance_row(bench: DriverBench, key: str, attempts: int) -> ConformanceRow:
+    """Test one row, with several attempts, as a computer that is busy delays a driver that is right.
 
-    def row(self, key: str) -> ConformanceRow:
-        """Test one row."""
-        bench = self._bench
-        row = ConformanceRow(key, NOT_TESTED)
-        left, held_up, pause = self._attempts, CONFORMANCE_LIMITS.held_up * self._attempts, 0.0
-        while left and held_up:
-            bench.longest_pause = 0.0
-            try:
-                found = CHECKS[key](bench)
-                row = ConformanceRow(key, WRONG if found else OK, found)
-            except Untested as reason:
-                row = ConformanceRow(key, NOT_TESTED, str(reason))
-            finally:
-                bench.be_proper()
-            if row.verdict == OK or key in ONCE:
-                break
-            pause = bench.longest_pause
-            left, held_up = (left, held_up - 1) if pause > CONFORMANCE_LIMITS.pause else (left - 1, held_up)
-        if row.verdict != OK and not held_up:
-            late = f"this computer delayed the test itself, last by {1e3 * pause:.0f} ms"
-            row = ConformanceRow(key, NOT_TESTED, f"{row.found} ({late})")
-        return row
+    One in which the test itself was held up does not count, and proves nothing.
+    """
+    row = ConformanceRow(key, NOT_TESTED)
+    left, held_up, pause = attempts, CONFORMANCE_LIMITS.held_up * attempts, 0.0
+    while left and held_up:
+        bench.longest_pause = 0.0
+        try:
+            found = CHECKS[key](bench)
+            row = ConformanceRow(key, WRONG if found else OK, found)
+        except Untested as reason:
+            row = ConformanceRow(key, NOT_TESTED, str(reason))
+        finally:
+            bench.be_proper()
+        if row.verdict == OK or key in ONCE:
+            break
+        pause = bench.longest_pause
+        left, held_up = (left, held_up - 1) if pause > CONFORMANCE_LIMITS.pause else (left - 1, held_up)
+    if row.verdict != OK and not held_up:
+        late = f"this computer delayed the test itself, last by {1e3 * pause:.0f} ms"
+        row = ConformanceRow(key, NOT_TESTED, f"{row.found} ({late})")
+    return row

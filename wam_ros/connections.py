@@ -32,14 +32,13 @@ class Peers:
 
     Attributes
     ----------
-    faults : present fault of each node that has reported, '' where it has none.
+    statuses : newest of each that has reported.
     """
 
     def __init__(self, names: Iterable[str]) -> None:
         self._absent = set(names)
         self.names = frozenset(self._absent)
-        self.faults: dict[str, str] = {}
-        self._busy: dict[str, tuple[str, frozenset[str]]] = {}  # by node in a long step: what, and who waits for it
+        self.statuses: dict[str, NodeStatus] = {}
 
     @property
     def absent(self) -> list[str]:
@@ -48,24 +47,22 @@ class Peers:
 
     def hear(self, status: NodeStatus) -> None:
         """Take the status of one of them."""
-        self.faults[status.node] = status.fault
-        self._busy.pop(status.node, None)
-        if busy := status.facts.get(BUSY):
-            self._busy[status.node] = busy, frozenset(status.facts.get(HELD_UP, "").split())
+        self.statuses[status.node] = status
         if status.connected:
             self._absent.discard(status.node)
 
     @property
     def faulty(self) -> dict[str, str]:
         """Present faults by node."""
-        return {node: fault for node, fault in sorted(self.faults.items()) if fault}
+        return {node: status.fault for node, status in sorted(self.statuses.items()) if status.fault}
 
     def held_up(self, nodes: Collection[str]) -> str:
         """The long step of another node, or of one of this process, that holds up these nodes, '' for none."""
-        found = [reason for reason, held in self._busy.values() if not held.isdisjoint(nodes)]
-        if (step := STEPS.recent()) and not STEPS.nodes.isdisjoint(nodes):
-            found.append(str(step))
-        return next(iter(found), "")
+        for facts in (status.facts for status in self.statuses.values() if BUSY in status.facts):
+            if not set(nodes).isdisjoint(facts.get(HELD_UP, "").split()):
+                return facts[BUSY]
+        step = STEPS.recent()
+        return str(step) if step and not STEPS.nodes.isdisjoint(nodes) else ""
 
 
 class StackNode(TolerantNode):

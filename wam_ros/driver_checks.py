@@ -10,6 +10,8 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Final
 
+import numpy as np
+
 from wam_description.driver_contract import REPLY, REQUIREMENTS, STATUS_AGE, STOP
 from wam_description.event import Level
 from wam_description.signals import State
@@ -88,16 +90,12 @@ def _velocity(bench: DriverBench) -> str:
     bench.watch(CONFORMANCE_LIMITS.look)
     states = bench.states()
     compared = []
-    for i, name in enumerate(bench.contract.motors):
-        moved = travelled = integral = 0.0
-        finest = math.inf  # step of the encoder, rad
-        for before, after in pairwise(states):
-            step = after.message.position[i] - before.message.position[i]
-            moved += step
-            travelled += abs(step)
-            finest = min(finest, abs(step) or math.inf)
-            dt = (after.stamp - before.stamp) * 1e-9
-            integral += 0.5 * (before.message.velocity[i] + after.message.velocity[i]) * dt
+    position, velocity = (np.array([getattr(one.message, name) for one in states]) for name in State._fields[:2])
+    times, steps = np.array([one.stamp for one in states]) * 1e-9, np.diff(position, axis=0)
+    integrals = np.diff(times) @ (velocity[1:] + velocity[:-1]) / 2.0
+    for name, step, integral in zip(bench.contract.motors, steps.T, integrals, strict=True):
+        moved, travelled = step.sum(), abs(step).sum()
+        finest = abs(step[step != 0.0]).min(initial=math.inf)  # step of the encoder, rad
         if travelled < CONFORMANCE_LIMITS.least_travel:
             continue
         compared.append(name)

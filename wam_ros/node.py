@@ -301,15 +301,20 @@ def make_node(entry: str, **ros: Any) -> Node:
     return node_factory(entry)(**ros)
 
 
-def node_makers(entries: Iterable[str]) -> dict[str, Callable[..., Node]]:
+def node_makers(entries: Iterable[str], **ros: Any) -> dict[str, Callable[..., Node]]:
     """What makes the node of each entry of the parameter `nodes`, by its name, as `wam_ros.run.run` takes it.
+
+    Parameters
+    ----------
+    entries : of the parameter `nodes`.
+    ros : what rclpy's Node takes, for all of them.
 
     Raises
     ------
     ParameterError
         where there is no such node.
     """
-    return {declared(entry).name: partial(make_node, entry) for entry in entries}
+    return {declared(entry).name: partial(make_node, entry, **ros) for entry in entries}
 
 
 def main() -> None:

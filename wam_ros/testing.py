@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,7 +18,7 @@ import yaml
 from rclpy.publisher import Publisher
 
 from wam_bag.bag import Bag, read
-from wam_bag.columns import Columns, columns_of
+from wam_bag.columns import columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import Interface, declared, require_parameters
 from wam_description.parameters import ParameterError, dotted
@@ -77,19 +78,13 @@ class Recorded(Mapping[str, Any]):
     """The messages of a run so far, as arrays, by the topic's name; topics without a message are not in it."""
 
     def __init__(self, types: Mapping[str, str]) -> None:
-        self._types = types
         self.data: dict[str, list[bytes]] = {topic: [] for topic in types}
-        self._made: dict[str, tuple[int, Columns]] = {}
+        self._columns = lru_cache(lambda topic, count: columns_of(types[topic], self.data[topic]))
 
     def __getitem__(self, topic: str) -> Any:
-        data = self.data.get(topic)
-        if not data:
+        if not (data := self.data.get(topic)):
             raise KeyError(f"nothing was recorded on '{topic}' so far; topics with messages: {', '.join(self)}")
-        count, columns = self._made.get(topic, (-1, None))
-        if columns is None or count != len(data):
-            columns = columns_of(self._types[topic], data)
-            self._made[topic] = len(data), columns
-        return columns
+        return self._columns(topic, len(data))
 
     def __iter__(self) -> Iterator[str]:
         return (topic for topic, data in self.data.items() if data)

@@ -203,7 +203,7 @@ class Simulation:
     def _require_progress(self, stamp: int) -> None:
         """Refuse to go on where the scenario does not get what it takes: the run would not end."""
         self._looked = stamp
-        if awaited := {topic for one in self._synchronisers[SCENARIO] for topic in one.awaited(stamp)}:
+        if awaited := self._awaited(SCENARIO):
             raise ValueError(
                 f"the scenario gets no {' and '.join(sorted(awaited))} for the state of {stamp} ns; "
                 f"{self._cause(sorted(awaited))}"
@@ -252,13 +252,12 @@ class Simulation:
 
     def _cause(self, topics: Sequence[str] = ("motor_current_command",)) -> str:
         """The node that is the reason why topics do not come, the command if none is given, and what to do about it."""
-        stamp = self.driver.stamp
-        awaited = {
-            name: {topic for one in found for topic in one.awaited(stamp)}
-            for name, found in self._synchronisers.items()
-        }
-        found = self._interface.unanswered(topics, awaited)
-        return unpublished(found)
+        awaited = {name: self._awaited(name) for name in self._synchronisers}
+        return unpublished(self._interface.unanswered(topics, awaited))
+
+    def _awaited(self, name: str) -> set[str]:
+        """Topics that a node lacks for the present state."""
+        return {topic for one in self._synchronisers[name] for topic in one.awaited(self.driver.stamp)}
 
     def _report(self) -> None:
         """Report a new mode or fault of the driver to every node that takes status."""

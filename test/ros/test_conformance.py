@@ -21,7 +21,7 @@ from wam_description.event import Event, Level
 from wam_description.signals import Answer, State
 from wam_driver.bus.safety_module import SafetyMode
 from wam_ros import conformance
-from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
+from wam_ros.conformance import NOT_TESTED, OK, WRONG, conformance_row, conformance_rows
 from wam_ros.driver_bench import DriverBench
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.node import make_node
@@ -49,9 +49,6 @@ class Bench:
             self._make(context=self.ros.context, namespace="/wam", cli_args=self._arguments, use_global_arguments=False)
         )
 
-    def conformance(self, attempts: int) -> Conformance:
-        return Conformance(self.probe, attempts)
-
 
 def simulated() -> Configuration:
     return driver_alone(Configuration.load(packaged("wam")))
@@ -63,7 +60,7 @@ def skeleton(monkeypatch: pytest.MonkeyPatch) -> Configuration:
 
 
 def wrong(bench: Bench, attempts: int = PATIENT) -> list[str]:
-    return [row.text for row in bench.conformance(attempts).rows() if row.verdict != OK]
+    return [row.text for row in conformance_rows(bench.probe, attempts) if row.verdict != OK]
 
 
 ON_SOCKETS = ["--config", "barrett-wam4-bus", "--bus", "udp_multicast:239.74.163.46", "--arm", "200"]
@@ -93,7 +90,6 @@ def test_an_attempt_that_the_computer_held_up_does_not_count(
     pause: float, tries: int, verdict: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     probe: Any = Heldup()
-    tested = Conformance(probe, 2)
     made = []
 
     def check() -> str:
@@ -102,7 +98,7 @@ def test_an_attempt_that_the_computer_held_up_does_not_count(
         return "it is wrong"
 
     monkeypatch.setitem(conformance.CHECKS, "rate", lambda bench: check())
-    row = tested.row("rate")
+    row = conformance_row(probe, "rate", 2)
     assert (row.verdict, len(made)) == (verdict, tries)
     assert ("delayed the test" in row.found) == (verdict == NOT_TESTED)
 
@@ -113,7 +109,7 @@ def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_ref
 ) -> None:
     configuration = driver_alone(Configuration.load(packaged("barrett-wam7")))
     bench = Bench(ros, tmp_path, configuration)
-    found = [bench.conformance(PATIENT).row(key) for key in ("refusals", "answers")]
+    found = [conformance_row(bench.probe, key, PATIENT) for key in ("refusals", "answers")]
     assert [row.text for row in found if row.verdict != OK] == []
     assert max(map(abs, bench.probe.carrying)) > 0.6, "A, in motor 4"
 
@@ -174,7 +170,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
     for module in ("driver_bench", "driver_checks"):
         monkeypatch.setattr(f"wam_ros.{module}.CONFORMANCE_LIMITS", short)
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
-    rows = list(bench.conformance(1).rows())
+    rows = list(conformance_rows(bench.probe, 1))
     assert [row.key for row in rows] == list(REQUIREMENTS)
     assert {row.verdict for row in rows[1:]} == {NOT_TESTED}
     assert rows[0].verdict == WRONG
@@ -268,14 +264,13 @@ def test_a_broken_driver_fails_row_by_row(ros: Network, tmp_path: Path, monkeypa
         driver.session.number -= 1
 
     bench.probe.end, bench.probe.restart = lambda: None, reborn
-    conformance_of_it = Conformance(bench.probe, 1)
-    assert conformance_of_it.row("interface").verdict == OK
+    assert conformance_row(bench.probe, "interface", 1).verdict == OK
     verdicts = {}
     for key in list(REQUIREMENTS)[1:]:
         driver.defect = key
         driver.health.publish_again()  # a status is sent as it is until the next one
         for _ in range(PATIENT):
-            verdicts[key] = conformance_of_it.row(key).verdict
+            verdicts[key] = conformance_row(bench.probe, key, 1).verdict
             was_held_up = bench.probe.longest_pause > CONFORMANCE_LIMITS.pause  # which brakes any driver
             if verdicts[key] == WRONG or (verdicts[key] == OK and not was_held_up):
                 break

@@ -16,7 +16,7 @@ from wam_driver.bus.line import answer, line_of
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
 from wam_ros.bring_up import NodeProcess
-from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
+from wam_ros.conformance import NOT_TESTED, OK, WRONG, conformance_rows
 from wam_ros.driver_bench import DriverBench
 from wam_ros.network import require_places
 from wam_ros.priority import set_priority
@@ -99,7 +99,7 @@ def run(given: argparse.Namespace) -> int:
         try:
             if driver:
                 bench.end, bench.restart = driver.stop, driver.start
-            for row in Conformance(bench, given.attempts).rows():
+            for row in conformance_rows(bench, given.attempts):
                 counts[row.verdict] += 1
                 print(row.text)
                 sys.stdout.flush()
