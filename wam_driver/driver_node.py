@@ -2,6 +2,8 @@
 
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -185,25 +187,24 @@ class DriverNode(ArmDriver):
         names = [f"{what} {motor}" for what in ("theta", "thetad", "commanded", "actual") for motor in motors]
         rows = [",".join(["stamp", *names])]
         rows += [",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.commanded, *s.actual))) for s in recent]
-        try:
+        with self._warning_of_failure():
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-        except OSError as error:
-            self._warn_of_post_mortem(error)
-        else:
             self.get_logger().error(f"the last {len(recent)} samples are in {path}")
 
     def _try_post_mortem(self) -> None:
         """Warn at the start where the samples of a fault could not be written."""
-        if not self._directory:
-            return
-        try:
-            Path(self._directory).mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=self._directory).close()
-        except OSError as error:
-            self._warn_of_post_mortem(error)
+        if self._directory:
+            with self._warning_of_failure():
+                Path(self._directory).mkdir(parents=True, exist_ok=True)
+                tempfile.TemporaryFile(dir=self._directory).close()
 
-    def _warn_of_post_mortem(self, error: OSError) -> None:
-        reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
-        self.health.facts["post_mortem"] = reason
-        self.get_logger().warning(f"{reason}; the last samples before a fault are not kept, give another directory")
+    @contextmanager
+    def _warning_of_failure(self) -> Iterator[None]:
+        """Warn where the directory cannot be written."""
+        try:
+            yield
+        except OSError as error:
+            reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
+            self.health.facts["post_mortem"] = reason
+            self.get_logger().warning(f"{reason}; the last samples before a fault are not kept, give another directory")

@@ -7,6 +7,7 @@ import math
 import os
 import statistics
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -142,8 +143,7 @@ def _silence(bench: DriverBench) -> str:
     return ""
 
 
-def _current(bench: DriverBench) -> str:
-    return bench.compare()
+_current = DriverBench.compare
 
 
 def _names(bench: DriverBench) -> str:
@@ -220,12 +220,8 @@ def _at_once(bench: DriverBench, service: str, switch: bool | None, mode: str) -
     return bench.stops(last, 1e-9 * bench.contract.outer_period) or bench.in_mode(mode)
 
 
-def _disable(bench: DriverBench) -> str:
-    return _at_once(bench, "enable", False, "braked")
-
-
-def _estop(bench: DriverBench) -> str:
-    return _at_once(bench, "estop", None, "fault")
+_disable = partial(_at_once, service="enable", switch=False, mode="braked")
+_estop = partial(_at_once, service="estop", switch=None, mode="fault")
 
 
 def _discard(bench: DriverBench) -> str:
@@ -244,6 +240,13 @@ def _discard(bench: DriverBench) -> str:
     return "" if bench.status.since > since else f"since stays {since} ns"
 
 
+def _enabled_after_reset(bench: DriverBench) -> str:
+    """That a driver can be enabled, whose fault was reset while its cause lasts; '' where it refuses."""
+    bench.ask("reset_fault")
+    done, text = bench.ask("enable", True)
+    return f"enable is done: '{text}'" if done else ""
+
+
 def _peers(bench: DriverBench) -> str:
     fault = "tested by wam conform"
     bench.enable()
@@ -256,9 +259,7 @@ def _peers(bench: DriverBench) -> str:
     bench.ask("reset_fault")
     bench.report(fault)
     bench.watch(CONFORMANCE_LIMITS.settle)
-    bench.ask("reset_fault")
-    done, text = bench.ask("enable", True)
-    return f"enable is done: '{text}'" if done else ""
+    return _enabled_after_reset(bench)
 
 
 def _claims(bench: DriverBench) -> str:
@@ -280,11 +281,7 @@ def _agreement(bench: DriverBench) -> str:
     bench.watch(CONFORMANCE_LIMITS.settle)
     bench.report(started_with="another")
     try:
-        if wrong := bench.in_mode("fault"):
-            return wrong
-        bench.ask("reset_fault")
-        done, text = bench.ask("enable", True)
-        return f"enable is done: '{text}'" if done else ""
+        return bench.in_mode("fault") or _enabled_after_reset(bench)
     finally:
         bench.report(node="transform")  # as the velocity loop is right again for the next row
 

@@ -325,12 +325,9 @@ def main() -> None:
         if not entries:
             raise SystemExit("usage: python3 -m wam_ros.program NAME [NAME ...] [--ros-args ...]")
         del sys.argv[1 : len(entries) + 1]
-    try:
-        makers = node_makers(entries)
-    except ParameterError as error:
-        raise SystemExit(f"error: {error}") from None
     with ExitStack() as files:
         try:
+            makers = node_makers(entries)
             arguments = [named_file(given, before, files) for before, given in pairwise(["", *sys.argv])]
         except ParameterError as error:
             raise SystemExit(f"error: {error}") from None

@@ -3,7 +3,7 @@
 import re
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from functools import cache, partial
+from functools import cached_property, partial
 from typing import Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
@@ -106,18 +106,30 @@ class _Channel:
     def __init__(self, topic: Topic, name: str, writers: Callable[[], Mapping[str, str]], arm: str) -> None:
         self.topic = topic
         self.name = name
-        self.publisher_of = _publisher_reader(topic, writers, arm)
-        self._writers = writers
-        self._arm = arm if topic.type == _DIAGNOSTICS else ""
+        self._writers, self._arm = writers, arm
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
         self.totals: dict[str, int] = {}  # published by each node that has announced it
         self._first_totals: dict[str, int] = {}
         self._is_shared = topic.name in EVERY_NODE
 
-    def is_foreign(self, data: bytes) -> bool:
-        """Whether a message is that of another arm or program on a topic that all share, with stamps of its own."""
-        return bool(self._arm) and not _status_name(self.topic.type, data).startswith(self._arm)
+    def sender_of(self, data: bytes) -> tuple[str, bool]:
+        """The node that sent a message, which rclpy does not report; whether it is of another arm or program.
+
+        On a topic that every node publishes, the message carries the node's name, up to a ':' or '/'.  In /diagnostics,
+        which all arms share, that of this arm comes before it; what others send there has stamps of its own.
+        """
+        if not self._is_shared:
+            return self._only_node, False
+        name = _status_name(self.topic.type, data)
+        is_foreign = self.topic.type == _DIAGNOSTICS and not name.startswith(self._arm)
+        return re.split("[:/]", name.removeprefix(self._arm))[0].strip() or "?", is_foreign
+
+    @cached_property
+    def _only_node(self) -> str:
+        """The node that publishes this topic, once a message has come; '' where there are several."""
+        nodes = set(self._writers().values())
+        return nodes.pop() if len(nodes) == 1 else ""
 
     def announce(self, node: str, total: int) -> None:
         """A node has published so many messages on this topic."""
@@ -154,6 +166,18 @@ class _Channel:
         return [writer for writer, node in self._writers().items() if node == publisher]
 
 
+class _Arrival(NamedTuple):
+    """A message that came, with the node that sent it, and whether that is of another arm or program."""
+
+    channel: _Channel
+    publisher: str
+    is_foreign: bool
+    data: bytes
+    received: int
+    sent: int
+    number: int
+
+
 class Recorder:
     """Writes every message into the bag and counts it; its memory does not grow with the recording.
 
@@ -186,7 +210,7 @@ class Recorder:
         self._stamps: dict[str, int] = {}
         self._newest = 0  # stamp of all, ns
         self._begin = 0  # no log time is before it, ns
-        self._held: list[tuple[_Channel, str, bytes, int]] | None = []  # until its start is known
+        self._held: list[_Arrival] | None = []  # until its start is known
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, offered(topic.depth, topic.latched))
@@ -212,28 +236,30 @@ class Recorder:
         channel = self._channels.get(name)
         if channel is None:
             return
-        publisher, is_foreign = channel.publisher_of(data), channel.is_foreign(data)
+        publisher, is_foreign = channel.sender_of(data)
+        one = _Arrival(channel, publisher, is_foreign, data, received, sent, number)
         channel.numbering(publisher).add(0 if is_foreign else number)  # of several nodes, with numbers of their own
         self._received += 1
         if self._held is not None:
             stamp = 0 if channel.topic.latched or is_foreign else channel.stamp_of(data)
             if not stamp and len(self._held) < RECORDER_LIMITS.held:
-                self._held.append((channel, publisher, data, number))
+                self._held.append(one)
                 return
             self._begin_at(stamp if stamp and number > 1 else 0)  # before the first one of a publisher nothing was
-        self._write(channel, publisher, data, received, sent, number)
+        self._write(one)
 
     def _begin_at(self, begin: int) -> None:
         """Write what came before the first stamp of a message that is not latched."""
         held, self._held, self._begin, self._newest = self._held or [], None, begin, begin
-        for channel, publisher, data, number in held:
-            self._write(channel, publisher, data, 0, 0, number)
+        for one in held:
+            self._write(one)
 
-    def _write(self, channel: _Channel, publisher: str, data: bytes, received: int, sent: int, number: int) -> None:
+    def _write(self, one: _Arrival) -> None:
+        channel, publisher, is_foreign, data, received, sent, number = one
         if self._lockstep:
             stamp = channel.stamp_of(data)
             is_unstamped = stamp == 0 and channel.topic.is_numbers  # sent by hand
-            if is_unstamped or channel.is_foreign(data):  # it came with the newest state
+            if is_unstamped or is_foreign:  # it came with the newest state
                 stamp = self._newest
             self._newest = max(self._newest, stamp or 0)
             is_free = stamp is None or channel.topic.latched  # of the time at which it came
@@ -321,26 +347,6 @@ def _counts(channel: _Channel) -> Iterator[Count]:
     for node, count in lost.items():
         if count:
             yield Count(channel.name, node, 0, 0, 0, count)
-
-
-def _publisher_reader(topic: Topic, writers: Callable[[], Mapping[str, str]], arm: str) -> Callable[[bytes], str]:
-    """A function that finds the node that sent a message, which rclpy does not report.
-
-    Parameters
-    ----------
-    topic : row of the table of topics; one that every node publishes carries the node's name, up to a ':' or '/'.
-    arm : what the names of this arm's nodes begin with in /diagnostics.
-    writers : finds the publishers of any other topic, once a message has come; of several the name is ''.
-    """
-    if topic.name in EVERY_NODE:
-        return lambda data: re.split("[:/]", _status_name(topic.type, data).removeprefix(arm))[0].strip() or "?"
-
-    @cache
-    def only_node() -> str:
-        nodes = set(writers().values())
-        return nodes.pop() if len(nodes) == 1 else ""
-
-    return lambda data: only_node()
 
 
 def _status_name(kind: str, data: bytes) -> str:

@@ -46,7 +46,6 @@ class RecorderNode(TolerantNode):
         interface = Interface(shared)
         topics = {self.resolve_topic_name(topic_name(self, topic)): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
-        publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, self._writers, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
         self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
@@ -58,7 +57,7 @@ class RecorderNode(TolerantNode):
         self._nodes = frozenset(interface.names) - {own_name}
         self._ends_last = own_name in interface.names  # one that was started by hand may end before the others
         self._unfinished = set(self._nodes) if self._ends_last else set()  # nodes without a final count
-        self._expected = {name: len([one for one in found if one != own_name]) for name, found in publishers.items()}
+        self._expected = {full: len({*interface.publishers(row.name)} - {own_name}) for full, row in topics.items()}
         self.stack = RecordedStack(self, shared, self._nodes, str(self.bag.path))
         self._status, self._diagnostics = (
             self.create_publisher(message_type(row), row.name, qos(row)) for row in map(BY_NAME.__getitem__, EVERY_NODE)

@@ -8,7 +8,6 @@ Topics of numbers are compared; in_contact and markers follow from the same esti
 """
 
 import math
-import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
@@ -343,12 +342,10 @@ def _labels(topic: Topic, columns: Columns, names: Sequence[str]) -> list[tuple[
 
 
 def _compare(topic: Topic, columns: Columns | None, replayed: Sequence[TopicValue], names: Sequence[str]) -> Compared:
-    if columns is None:
-        return Compared(topic.name, 0, 0, len(replayed), 0, None, 0.0, "", None)
-    recorded = [flat(topic, stamp, value) for stamp, value in _values(columns, names)]
+    recorded = [flat(topic, *message) for message in _values(columns, names)] if columns else []
     known = {row.stamp: row for row in replayed}
     both = [(row, known[row.stamp]) for row in recorded if row.stamp in known]
-    labels = _labels(topic, columns, names)
+    labels = _labels(topic, columns, names) if columns else []
     differing = [one for old, new in both if (one := _differences(topic, old, new, labels))]
     first = differing[0][0][0] if differing else None
     sizes = [(size, unit) for _, size, unit in chain(*differing) if 0.0 < size < math.inf]
@@ -369,7 +366,7 @@ def _differences(
         return [(Difference(old.stamp, "number of values", len(old.values), len(new.values)), 0.0, "")]
     found = []
     for i, (a, b) in enumerate(zip(old.values, new.values, strict=True)):
-        if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
+        if repr(a) != repr(b):  # to the bit, but for one NaN from another
             row, column = divmod(i, len(labels))
             field, unit = labels[column]
             named = f"row {row}, {field}" if topic.type == TABLE else field
