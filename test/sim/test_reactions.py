@@ -41,7 +41,7 @@ STEPS = """
 - {name: brake, seconds: 0.2, request: disable}
 """
 REFUSED = {
-    "too small": ("refused", "may be wrong by"),
+    "too small": ("refused", "cannot be controlled because of"),
     "above the limit": ("refused", "allowed: up to force_limit, 60 N"),
     "one place twice": ("refused", "may be wrong by"),
 }
