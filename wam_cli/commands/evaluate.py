@@ -52,7 +52,9 @@ def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study
     parser.add_argument(
         "--only", type=bounded(int), nargs="+", metavar="NUMBER", help="only these cases, each printed in full"
     )
-    parser.add_argument("--write", type=PAGE, help=f"write the result into a page, for example {kind.page}")
+    parser.add_argument(
+        "--write", type=PAGE, help=f"write the result into a page, for example {kind.page or 'docs/PAGE.md'}"
+    )
     for one in _options(kind):
         _add(parser, one)
     take_configuration(parser, kind.base)
