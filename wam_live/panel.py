@@ -72,7 +72,7 @@ Request = Call | SetParameters | Press | Play | Bend
 
 
 class Controls:
-    """The controls.
+    """The controls of the page: status, buttons, sliders and plots.
 
     Parameters
     ----------

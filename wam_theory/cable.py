@@ -86,7 +86,14 @@ def play_torque(stretch: ArrayLike, stiffness: ArrayLike, backlash: ArrayLike) -
 
 
 def slack_stretch(stiffness: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> Array:
-    """Stretch at which the loose strand goes slack, x0 = 2 T0 r/k, rad; arguments as in `circuit_torque`."""
+    """Stretch at which the loose strand goes slack, x0 = 2 T0 r/k, rad.
+
+    Parameters
+    ----------
+    stiffness : k of the circuit at its motor, N m/rad.
+    pretension : T0 of a strand, N.
+    radius : r of the pinion, m.
+    """
     stiffness, radius = above_zero(stiffness=stiffness, radius=radius)
     (pretension,) = zero_or_more(pretension=pretension)
     return 2.0 * pretension * radius / stiffness

@@ -4,7 +4,7 @@ import math
 
 
 def rounded_down(value: float) -> float:
-    """To three digits, never up: a value that is named as allowed has to be accepted."""
+    """A value to three digits and never above it, so that a value that is named as allowed is accepted."""
     if not value:
         return 0.0
     digit = 10.0 ** (math.floor(math.log10(value)) - 2)
@@ -12,6 +12,6 @@ def rounded_down(value: float) -> float:
 
 
 def rounded_up(value: float) -> float:
-    """To three digits, never down: as `rounded_down`, for what is named as the least allowed."""
+    """A value to three digits and never below it, so that a value that is named as the least allowed is accepted."""
     digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value else 1.0
     return math.ceil(value / digit) * digit

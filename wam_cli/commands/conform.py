@@ -163,7 +163,7 @@ def driver_alone(configuration: Configuration) -> Configuration:
 
 
 def on_bus(configuration: Configuration, bus: str) -> Configuration:
-    """A configuration with another bus, 'CHANNEL' of socketcan or 'INTERFACE:CHANNEL'; the same for ''."""
+    """A configuration with another bus, 'CHANNEL' of socketcan or 'INTERFACE:CHANNEL'; for '' as it is."""
     if not bus:
         return configuration
     interface, _, channel = bus.rpartition(":")

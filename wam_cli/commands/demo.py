@@ -125,7 +125,7 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
 
 
 def stoppable_report(bag: Path, failed: bool, task: Experiment | None) -> tuple[str, ...] | None:
-    """Print the report, see `_report`; a signal ends the program with where the recording is, which is closed."""
+    """Print the report; returns what is wrong in it, None where there is none.  A signal ends the program cleanly."""
     again = f"wam analyse {shlex.quote(str(bag))} --steps"
     stated = "stopped before the report was finished"
     end_at_once_on_signals(f"\n{stated}; the recording is in {bag}; to print the report: {again}\n")

@@ -65,7 +65,7 @@ def without_effect(values: list[str], done: Replay) -> list[str]:
 
 
 def reasons(done: Replay) -> list[str]:
-    """Why topics are not the same, as far as the recording shows."""
+    """Why replayed and recorded topics differ, as far as the recording shows."""
     if done.is_same:
         return []
     lines = []

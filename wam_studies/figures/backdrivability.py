@@ -70,7 +70,7 @@ class Backdriving:
     def masses(
         self, q: tuple[float, ...], directions: NDArray[np.float64], payload: float = 0.0, rotors: bool = True
     ) -> NDArray[np.float64]:
-        """Effective mass along each direction, (d, 3), kg; other arguments as in `mobility`."""
+        """Effective mass, (d,), kg, of the tip along each direction, (d, 3), in a pose q, rad, with a payload, kg."""
         along = np.einsum("di,ij,dj->d", directions, self.mobility(q, payload, rotors), directions)
         return np.asarray(1.0 / along, dtype=np.float64)
 
@@ -80,7 +80,7 @@ class Backdriving:
         return np.asarray((self.friction / levers).min(axis=1), dtype=np.float64)
 
     def at(self, q: tuple[float, ...], payload: float) -> Backdriven:
-        """Inertia and friction in this pose; arguments as in `mobility`."""
+        """What a push at the tip meets in a pose q, rad, with a payload, kg."""
         whole, links = (self.masses(q, self._directions, payload, rotors) for rotors in (True, False))
         principal = np.maximum(np.linalg.eigvalsh(self.mobility(q, payload)), 1e-12)
         share = float(np.mean(1.0 - links / whole))

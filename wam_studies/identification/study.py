@@ -38,7 +38,7 @@ AT = ComparedAt()
 
 
 class IdentificationTrial(NamedTuple):
-    """One identification.
+    """A case: one identification from one motion on one plant.
 
     Attributes
     ----------

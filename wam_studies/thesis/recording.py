@@ -88,7 +88,7 @@ class ObjectTrace(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """One run.
+    """A recorded run of an experiment.
 
     Attributes
     ----------
