@@ -42,13 +42,13 @@ class LoopDesign(NamedTuple):
         part, ratio = self.loop.gain / verdict.margin, node.transmission_stiffness / node.contact_stiffness
         stiction = "none"
         if cycle.peak_to_peak:
-            stiction = f"{cycle.peak_to_peak:.4g} peak to peak every {cycle.period:.3g} s, without a deadband of "
-            stiction += f"{cycle.deadband:.3g}"
+            stiction = f"{cycle.peak_to_peak:.4g} peak to peak every {cycle.period:.3g} s; a deadband of "
+            stiction += f"{cycle.deadband:.3g} removes it"
         undecided = verdict.undecided_error
         lines = [
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
-            f"margin: the gain is {part:.3g} of the largest linearly stable one, {verdict.margin:.4g}",
-            f"largest safe error: {verdict.stable_error:.4g}; the loop has {self.loop.error_limit:.4g}",
+            f"margin: the gain is {part:.3g} times the largest linearly stable one, {verdict.margin:.4g}",
+            f"largest safe error: {verdict.stable_error:.4g}; saturation of the loop: {self.loop.error_limit:.4g}",
             *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
             f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
             ASSUMED,

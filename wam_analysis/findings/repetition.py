@@ -75,7 +75,7 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
         COMMANDED_CYCLE: ", as it was commanded",
         HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion, "
         "which is not followed linearly",
-        UNKNOWN: "; its command is not known: name it with --command, in a table with titles as command.position.JOINT",
+        UNKNOWN: "; its command is not known: name the topic with --command, or the column command.position.JOINT",
     }
     return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."
 

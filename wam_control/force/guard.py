@@ -258,7 +258,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
         "worst": assessment.where,
         "effective stiffness [N/m]": f"{assessment.stiffness:.4g}",
         "limit cycle [N]": f"{cycle.peak_to_peak:.4g}",
-        "limit cycle [s]": f"{cycle.period:.4g}",
+        "period of the limit cycle [s]": f"{cycle.period:.4g}",
         "deadband that removes it [N]": f"{cycle.deadband:.4g}",
         "verdict": assessment.reason or "accepted",
     }
