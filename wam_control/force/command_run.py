@@ -37,7 +37,7 @@ class AxisRun:
     place : where its force acts.
     watch, motion : what is reported of its force, or of its motion.
     anchor : position to hold where none is commanded, m or rad.
-    wound : force, N, to which the velocity loops have wound up before its torque is fed forward; NaN until then.
+    wound_up : force, N, to which the velocity loops have wound up before its torque is fed forward; NaN until then.
     side : 1 or -1, on which side along it an impedance is touched.
     is_kept : whether its force is left as it is.
     """
@@ -47,7 +47,7 @@ class AxisRun:
         self.known = UNKNOWN
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
-        self.anchor, self.wound, self.side, self.is_kept = math.nan, math.nan, 1.0, False
+        self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
         self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
 
     def goal(self, axis: CommandedAxis, dt: float, lasting: float) -> float:
@@ -174,7 +174,7 @@ class CommandRun:
         for one in self.axes:
             for other in before.axes:
                 if (before.frame, other.of) == (self.frame, one.of):
-                    one.place, one.anchor, one.wound = other.place, other.anchor, other.wound
+                    one.place, one.anchor, one.wound_up = other.place, other.anchor, other.wound_up
                     self.fed, self.feed_forward = before.fed, before.feed_forward
 
     @property

@@ -37,7 +37,7 @@ from wam_control.force.limits import (
     joint_bounds,
     resolution,
     rise_time,
-    winding,
+    servo_yielding,
 )
 from wam_control.force.problem import VelocityRow, solve
 from wam_control.force.stability_guard import GuardAssessment, Guarded
@@ -460,7 +460,7 @@ class ForceLoop:
             ahead = float(axis.along @ self._measurement.ahead) / yielding
         speed = factor * one.watch.oscillation.share * law.velocity(0, error - ahead, before - ahead, dt)
         if axis.desired:  # back no faster than the measured force can follow
-            slack = winding(axis, self._supervision.wound, own)
+            slack = servo_yielding(axis, self._supervision.servo_stiffness, own)
             most = approach_speed(axis, one.watch.touch.is_there, own, slack)
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
@@ -527,9 +527,9 @@ class ForceLoop:
             if axis.is_force:
                 at_once += own.force_feedforward * axis.desired * axis.along
                 if run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
-                    if math.isnan(one.wound):
-                        one.wound = one.known.force * own.is_estimated
-                    later += ((1.0 - own.force_feedforward) * axis.desired - one.wound) * axis.along
+                    if math.isnan(one.wound_up):
+                        one.wound_up = one.known.force * own.is_estimated
+                    later += ((1.0 - own.force_feedforward) * axis.desired - one.wound_up) * axis.along
         if own.limits.impact:
             missing = later - run.fed
             way, whole = (float(np.abs(one).max()) for one in (missing, [later, run.fed]))

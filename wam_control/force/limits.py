@@ -49,7 +49,9 @@ def rise_time(own: ForceLoopParameters) -> float:
     return FORCE.rise * latency(own)
 
 
-def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters, winding: float = 0.0) -> float:
+def approach_speed(
+    axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters, servo_yielding: float = 0.0
+) -> float:
     """Largest speed along a force, m/s.
 
     Until something is touched, the impact (3.1), v sqrt(m k), stays below `limits.impact` of the force.  At a place
@@ -62,7 +64,7 @@ def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParamet
     axis : of the force.
     is_touching : whether something is touched.
     own : parameters of the force loop.
-    winding : of the velocity loops, m/N.
+    servo_yielding : how far the velocity loops yield to a force, m/N.
     """
     sensed, place, limits = axis.sensed, axis.place, own.limits
     if not limits.impact or sensed is None or place is None or not sensed.speed_fraction:
@@ -71,7 +73,7 @@ def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParamet
     whole = axis.desired * sensed.yielding(own.guard.contact_stiffness)
     rise = rise_time(own) if place.is_known else max(FORCE.identified_rise, rise_time(own))
     if is_touching:
-        return max((whole + axis.desired * winding) / sensed.speed_fraction / rise, slowest)
+        return max((whole + axis.desired * servo_yielding) / sensed.speed_fraction / rise, slowest)
     fastest = limits.impact * axis.desired / math.sqrt(sensed.impact_mass * own.guard.contact_stiffness)
     if not place.is_known:
         detected = rise_time(own) if own.is_estimated else FORCE.detected * own.force_filter
@@ -79,7 +81,7 @@ def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParamet
     return fastest / sensed.speed_fraction
 
 
-def winding(axis: CommandedAxis, wound: Array, own: ForceLoopParameters) -> float:
+def servo_yielding(axis: CommandedAxis, servo_stiffness: Array, own: ForceLoopParameters) -> float:
     """How far the velocity loops yield to a force that is not fed forward, m/N: |l|^4 / l.K l.
 
     From the motors, this is a force at a place that is not known.
@@ -87,13 +89,13 @@ def winding(axis: CommandedAxis, wound: Array, own: ForceLoopParameters) -> floa
     Parameters
     ----------
     axis : of the force.
-    wound : integral gains K at the joints (n, n), N m/rad.
+    servo_stiffness : integral gains K at the joints (n, n), N m/rad.
     own : parameters of the force loop.
     """
     if axis.place is None or axis.place.is_known or not own.is_estimated:
         return 0.0
     square = float(axis.along @ axis.along)
-    return square * square / max(float(axis.along @ wound @ axis.along), FORCE.negligible)
+    return square * square / max(float(axis.along @ servo_stiffness @ axis.along), FORCE.negligible)
 
 
 def is_too_slow(axis: CommandedAxis, own: ForceLoopParameters) -> bool:
