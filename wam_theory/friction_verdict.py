@@ -83,7 +83,7 @@ def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = DESIG
 
 
 def linear_margin(node: FrictionNode, loop: IntegralLoop) -> float:
-    """Largest linearly stable G_I without friction, 0 without damping."""
+    """Largest linearly stable G_I of a node under a loop, without its friction; 0 without damping."""
     plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not node.damping:
         return 0.0
@@ -93,7 +93,7 @@ def linear_margin(node: FrictionNode, loop: IntegralLoop) -> float:
 
 
 def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
-    """Limit cycle of (5.8), (5.9), and the deadband that removes it."""
+    """Stiction limit cycle of a node under a loop with this gain, and the deadband that removes it."""
     stiffness = node.transmission_stiffness, node.contact_stiffness
     friction = node.static_friction, node.dynamic_friction
     if node.static_friction <= node.dynamic_friction or not gain:
@@ -117,6 +117,11 @@ def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = DESIGN.e
     Do not use the largest stable step as the saturation limit: after a larger step the loop oscillates
     indefinitely, by several times that limit.  So each candidate is tried with steps up to 50 times as
     large, and with the node thrown at the contact.
+
+    Parameters
+    ----------
+    node, loop : whose responses are followed.
+    events : of the integrator, samples among them, after which a response is undecided.
     """
     if not node.static_friction:
         return StableErrors(0.0, 0.0)
