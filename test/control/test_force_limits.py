@@ -17,13 +17,13 @@ from wam_control.force.limits import (
     followed,
     joint_bounds,
     likeliest_link,
-    winding,
+    servo_yielding,
 )
 from wam_description.transmission_map import TransmissionMap
 
 JOINTS, DT = WAM.joints, 0.005
 MOTORS = replace(OWN, feedback="contact_estimate")
-WOUND = TransmissionMap.of(WAM).at_joints(CONFIGURATION.shared.servo.integral_gain)
+STIFF_SERVO = TransmissionMap.of(WAM).at_joints(CONFIGURATION.shared.servo.integral_gain)
 LOWER, UPPER = np.array(JOINTS.lower), np.array(JOINTS.upper)
 
 
@@ -83,11 +83,11 @@ def test_an_approach_hits_no_harder_than_allowed_and_a_touch_rises_no_faster_tha
 def test_a_force_at_a_place_that_is_not_known_rises_as_fast_as_the_velocity_loops_wind_up() -> None:
     axis = axis_at(POSES[0])
     assert axis.place is not None
-    assert winding(axis, WOUND, MOTORS) == 0.0, "at a pinned place the torque is fed forward"
+    assert servo_yielding(axis, STIFF_SERVO, MOTORS) == 0.0, "at a pinned place the torque is fed forward"
     estimated = axis._replace(place=axis.place._replace(is_pinned=False, is_known=False))
-    assert winding(estimated, WOUND, OWN) == 0.0
-    yielding = winding(estimated, WOUND, MOTORS)
-    assert winding(estimated, 2.0 * WOUND, MOTORS) == pytest.approx(yielding / 2.0)
+    assert servo_yielding(estimated, STIFF_SERVO, OWN) == 0.0
+    yielding = servo_yielding(estimated, STIFF_SERVO, MOTORS)
+    assert servo_yielding(estimated, 2.0 * STIFF_SERVO, MOTORS) == pytest.approx(yielding / 2.0)
     faster = approach_speed(estimated, True, MOTORS, yielding) - approach_speed(estimated, True, MOTORS)
     assert faster > 0.0
     assert approach_speed(estimated, False, MOTORS, yielding) == approach_speed(estimated, False, MOTORS)
