@@ -23,8 +23,6 @@ def _refusal(reason: str, at: Any) -> yaml.YAMLError:
 
 class _Strict(_LOADER):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        if not isinstance(node, yaml.MappingNode):
-            raise _refusal("it is marked as a mapping and is none", node)
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key.value in seen:
@@ -64,14 +62,10 @@ def parse(text: str) -> Any:
         _require_plain(text)
         return yaml.load(text, _Strict)  # a safe loader
     except UNREADABLE as error:
-        raise yaml.YAMLError(f"one of its values does not fit its tag, or is no date: {error}") from error
+        raise yaml.YAMLError(f"one of its values cannot be read: {error}") from error
 
 
 def _require_plain(text: str) -> None:
-    try:
-        text.encode()
-    except UnicodeEncodeError as error:
-        raise yaml.YAMLError(f"character {error.start + 1} is no UTF-8") from error
     within: list[str | None] = []  # anchors of the mappings and lists around an event
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.CollectionStartEvent):

@@ -96,7 +96,7 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
     ("text", "message"),
     [
         ("a: [1,", "is not YAML"),
-        ("/**: !!map x", "is not YAML: it is marked as a mapping and is none"),
+        ("/**: !!map x", "is not YAML: one of its values cannot be read"),
         ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
         ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
         ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
@@ -255,10 +255,10 @@ def test_values_at_their_bounds_a_longer_link_whose_numbers_meet_and_a_tool_beyo
     [
         ("{a: 1, a: 2}", "'a' is given twice; remove one of the two"),
         ("[" * 3000, "nested more than 50 levels deep"),
-        ("2001-99-99", "no date: month must be in 1..12"),
-        ("9" * 5000, "one of its values does not fit its tag"),
+        ("2001-99-99", "one of its values cannot be read: month must be in 1..12"),
+        ("9" * 5000, "one of its values cannot be read"),
         ("0x" + "f" * 5000, "a number of 5002 digits is beyond every float"),
-        ("\udcff", "character 1 is no UTF-8"),
+        ("\udcff", "cannot be read: .utf-8. codec"),
         ("&a [*a]", r"\*a is inside of what it refers to"),
         ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
         ("[1.0, 1:30]", "1:30 is 90 in YAML"),
