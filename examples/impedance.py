@@ -67,7 +67,7 @@ class Impedance:
         }
 
     def _admitted(self, posture: list[float], q: list[float]) -> list[float]:
-        """The posture x0 belongs to: the commanded one; if that is beyond the stops, the last one that was not.
+        """Posture in which the tip is at x0: the last commanded one within the stops.
 
         Without a command it is the present posture q.
         """
