@@ -52,8 +52,8 @@ class BusDriver(ArmDriver):
         return self._tick * self.shared.timing.period_ns
 
     def is_waiting(self) -> bool:
-        """Whether the motors are not known yet."""
-        return not self.hardware.is_running
+        """Whether a person has not activated the arm yet: a scenario waits for that."""
+        return bool(self.advice)
 
     def _run(self) -> None:
         hardware, timing = self.hardware, self.shared.timing
