@@ -142,17 +142,14 @@ def replay(
     outputs = [topic for topic in declaration.outputs if rows[topic].is_numbers]
     inputs = [topic for topic in declaration.inputs if rows[topic].is_replayed]
     bag = read(path, [*inputs, *outputs, STATUS], may_lack=True)
-    if not any(name.endswith(f"/{topic}") for name in bag.topics for topic in (*inputs, *outputs)):
-        raise BagError(f"{bag.path} has no topic of the node {node}; give a bag of this stack")
     run = recorded_run(bag, namespace)
     run = run._replace(parameters=run.parameters.with_options(values))
     namespace = run.namespace
     _require_types(bag, namespace, [rows[topic] for topic in (*inputs, *outputs)])
+    triggers = (reaction.trigger.topic for reaction in declaration.reactions)
+    if missing := next((trigger for trigger in triggers if f"{namespace}/{trigger}" not in bag.topics), ""):
+        raise BagError(f"{path} lacks the topic {missing}, without which {declaration.name} does nothing")
     shared, own = _parameters(run, declaration, configuration)
-    triggers = [reaction.trigger.topic for reaction in declaration.reactions]
-    missing = [trigger for trigger in triggers if f"{namespace}/{trigger}" not in bag.topics]
-    if missing:
-        raise BagError(f"{path} lacks the topic {missing[0]}, without which {declaration.name} does nothing")
     present = (
         configuration.sections.get(declaration.name, {}) if configuration else run.parameters.nodes[declaration.name]
     )

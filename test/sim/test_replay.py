@@ -213,7 +213,7 @@ def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
         writer.attach("parameters.yaml", "application/yaml", read(bag).attachments["parameters.yaml"])
     with pytest.raises(BagError, match="part lacks the topic joint_states, without which gravity does nothing"):
         replay(tmp_path / "part", "gravity")
-    with pytest.raises(BagError, match="no topic of the node velocity_loop"):
+    with pytest.raises(BagError, match="part lacks the topic motor_states, without which velocity_loop does nothing"):
         replay(tmp_path / "part", "velocity_loop")
 
 
