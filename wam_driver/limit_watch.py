@@ -18,18 +18,17 @@ class WatchedLimit(NamedTuple):
     unit: str
     where: str = ""
 
-    def _in_words(self, where: str) -> str:
-        return f"{self.quantity} {self.value:.2f} {self.unit} is {where} its limit {self.limit:g}{self.where}"
-
     @property
     def warning(self) -> str:
         """The warning, in words."""
-        return self._in_words("near")
+        return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}{self.where}"
 
     @property
     def excess(self) -> str:
         """That the quantity is above its limit, which is a fault; '' while it is not."""
-        return "" if self.value <= self.limit else self._in_words("above")
+        if self.value <= self.limit:
+            return ""
+        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}{self.where}"
 
 
 class LimitWatch:
