@@ -424,6 +424,16 @@ def test_one_or_two_breakaways_have_an_error_too(end: int) -> None:
     assert abs(found.static.value - 0.25) < 3.0 * found.static.error < 0.5 * found.static.value
 
 
+def test_fewer_samples_than_a_window_do_not_show_the_other_direction() -> None:
+    """A push that lasts as long as a short motion back was taken for an offset: dry friction was wrong by a quarter."""
+    time, back = np.arange(800) / 200.0, slice(700, 718)
+    velocity = np.where(time < 3.0, -(0.05 + 0.03 * np.sin(3.0 * time)), 0.0)
+    velocity[back] = 0.3 * np.sin(math.pi * (np.arange(18) + 0.5) / 18)
+    torque = 0.2 * np.sign(velocity) + 0.05 * velocity + draws(4, 800, 1e-5)
+    torque[back] -= 0.1
+    assert identify_friction(time, velocity, torque, rest=0.002, window=0.03).dynamic.value == PRECISE(0.2, rel=0.01)
+
+
 def test_a_shaft_whose_encoder_counts_in_a_rest_is_not_at_rest() -> None:
     """A count in each 5 ms, too short for a motion: it moves at 0.8 rad/s, and carries dynamic friction."""
     time, velocity, torque = stops(0.18, 0.19, 0.4)
