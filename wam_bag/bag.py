@@ -21,7 +21,6 @@ from mcap.records import Channel
 from wam_bag.bag_file import files, is_selected, opened, parts, type_of
 from wam_bag.columns import (
     BoolColumns,
-    ClockColumns,
     Collector,
     Columns,
     JointColumns,
@@ -40,7 +39,7 @@ from wam_bag.message_text import full_name
 from wam_bag.recorder_parameters import mode_of, with_nodes_of
 
 __all__ = [
-    "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns",
+    "Bag", "BagError", "BoolColumns", "Columns", "JointColumns", "Messages", "PointColumns",
     "TableColumns", "WrenchColumns", "read",
 ]  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Bags on disk: their files found and opened, their messages selected, and errors in the user's words."""
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -67,18 +68,14 @@ def _listed_files(path: Path) -> list[str]:
     except (yaml.YAMLError, ValueError, KeyError, TypeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BagError(f"{file} is damaged ({reason}); {command('wam bag repair', path)} writes it again") from None
-    for name in listed:
-        if Path(name).is_absolute() or ".." in Path(name).parts:
-            raise BagError(
-                f"{file} lists {name}, which is outside the bag; {command('wam bag repair', path)} writes "
-                "metadata.yaml again from the files in the directory"
-            )
+    for name, times in Counter(listed).items():
         if name.endswith(COMPRESSED):
             raise _compressed(path)
-        if not name.endswith(".mcap"):
-            raise BagError(f"{path} is recorded as {name}; only storage 'mcap' is read")
-    if len(set(listed)) < len(listed):
-        raise BagError(f"{file} lists a file twice; {command('wam bag repair', path)} writes it again")
+        if times > 1 or Path(name).is_absolute() or ".." in Path(name).parts or not name.endswith(".mcap"):
+            raise BagError(
+                f"{file} lists {name}, which cannot be a file of this bag, or is there twice; "
+                f"{command('wam bag repair', path)} writes metadata.yaml again from the files in the directory"
+            )
     return listed
 
 
@@ -202,13 +199,9 @@ def type_of(file: BagFile, channel: Channel) -> MessageType:
     if encoding not in SCHEMAS:
         read = ", ".join(f"'{one}'" for one in (*SCHEMAS, JSON))
         raise BagError(f"{file.path} has topic {channel.topic} in encoding '{encoding}'; {read} are read; {instead}")
-    if schema is None:
-        raise BagError(f"{file.path} has topic {channel.topic} without a schema; {instead}")
-    if schema.encoding != SCHEMAS[encoding]:
-        raise BagError(
-            f"{file.path} has the schema of topic {channel.topic} in '{schema.encoding}'; "
-            f"only '{SCHEMAS[encoding]}' is read; {instead}"
-        )
+    if schema is None or schema.encoding != SCHEMAS[encoding]:
+        what = f"a schema in '{schema.encoding}'" if schema else "no schema"
+        raise BagError(f"{file.path} has topic {channel.topic} with {what}; '{SCHEMAS[encoding]}' is read; {instead}")
     try:
         name = full_name(schema.name)
         return MessageType(name, encoding, definitions(name, schema.data))

@@ -352,8 +352,6 @@ def _make(path: Path) -> None:
             raise RecordingError(
                 f"bag {path} exists already; nothing was written. Give another name or move it away"
             ) from None
-        if isinstance(error, (FileExistsError, NotADirectoryError)):
-            raise RecordingError(f"a parent of bag {path} is a file; give another directory") from None
         raise RecordingError(
             f"bag {path} cannot be created: {error.strerror}; give a directory that can be written"
         ) from None

@@ -110,14 +110,6 @@ class BoolColumns(NamedTuple):
 
 
 @_brief
-class ClockColumns(NamedTuple):
-    """rosgraph_msgs/Clock, k messages."""
-
-    log_time_ns: Times
-    stamp_ns: Times
-
-
-@_brief
 class Messages(NamedTuple):
     """Messages of any other type; fields are attributes, arrays of numbers numpy arrays."""
 
@@ -130,7 +122,7 @@ class Messages(NamedTuple):
         return np.array(values, object if values and isinstance(values[0], str) else None)
 
 
-Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | ClockColumns | Messages
+Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | Messages
 
 
 def series(columns: Columns) -> Series:
@@ -327,10 +319,6 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
     "std_msgs/msg/Bool": (
         lambda group: (group.numbers("data")[:, 0] != 0,),
         lambda times, groups: BoolColumns(times, _filled(groups, 0, (len(times),), np.bool_)),
-    ),
-    "rosgraph_msgs/msg/Clock": (
-        lambda group: (group.time("clock"),),
-        lambda times, groups: ClockColumns(times, _filled(groups, 0, (len(times),), np.int64)),
     ),
 }
 
