@@ -39,7 +39,6 @@ class ShaftThresholds:
     singular: float = 1e12  # condition of normal equations beyond which a column has no information
     # of a direction that the recording does not show, from which on a factor is not determined
     undetermined: float = 1e-3
-    repeated: float = 0.15  # of length and speed, by which a motion that repeats another may differ from it
     # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
     jump: float = 6.0
     unsure: float = 0.25  # of a number; with a larger standard error it is not identifiable

@@ -1,7 +1,6 @@
 """Friction of a motor or of a joint, identified from velocity and torque."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -251,62 +250,16 @@ def _halves(rows: Index) -> Rows:
 
 
 def _disagreement(columns: Numbers, wanted: Numbers, half: Rows) -> Numbers:
-    """Standard errors of the columns' factors from leaving out one half of a motion at a time, and all that repeat it.
-
-    What the law leaves out returns where a motion is repeated: as separate halves, repetitions would agree on it and
-    lessen the error.  Where hardly anything can be left out with all that repeat it, halves are left out one by one,
-    and the error counts as many of them as do not repeat each other.
-    """
+    """Standard errors of the columns' factors from leaving out one half of a motion at a time (jackknife)."""
     begins = np.flatnonzero(np.diff(half, prepend=half[0] - 1))
     pieces = list(zip(np.split(columns, begins[1:]), np.split(wanted, begins[1:]), strict=True))
-    group = _repeated([(a[:, 0], a[:, 1]) for a, _ in pieces])
-    products = np.array([a.T @ a for a, _ in pieces])
-    targets = np.array([a.T @ b for a, b in pieces])
-    grouped = _spread(_sums(products, group), _sums(targets, group))
-    if grouped is not None:
-        return grouped
-    single = _spread(products, targets)
-    repetitions = len(pieces) / (max(group) + 1)
-    return np.zeros(columns.shape[1]) if single is None else math.sqrt(repetitions) * single
-
-
-def _sums(parts: Numbers, group: Sequence[int]) -> Numbers:
-    """Sum of the parts of each group."""
-    sums = np.zeros((max(group) + 1, *parts.shape[1:]))
-    np.add.at(sums, group, parts)
-    return sums
-
-
-def _spread(products: Numbers, targets: Numbers) -> Numbers | None:
-    """Standard errors from solving normal equations without one of the parts each; None from less than two."""
+    products, targets = np.array([a.T @ a for a, _ in pieces]), np.array([a.T @ b for a, b in pieces])
     left, right = products.sum(axis=0) - products, targets.sum(axis=0) - targets
     is_known = np.linalg.cond(left) < SHAFT.singular
     found = np.linalg.solve(left[is_known], right[is_known][:, :, None])[:, :, 0]
     if len(found) < 2:
-        return None
+        return np.zeros(columns.shape[1])
     return _few(len(found) - 1.0) * np.sqrt((len(found) - 1) * np.var(found, axis=0))
-
-
-def _repeated(halves: Sequence[tuple[Numbers, Numbers]]) -> list[int]:
-    """Number of the first half that each half, of directions and velocities, repeats: as long, as fast, as it begins.
-
-    Two repeat each other if length, mean and first and last speed are alike; speeds are compared with the mean.
-    """
-    marks = np.array([_mark(direction[0], np.abs(velocity)) for direction, velocity in halves])
-    group, number = np.full(len(marks), -1), 0
-    while (left := np.flatnonzero(group < 0)).size:
-        alike = np.all(np.abs(marks[left] - marks[left[0]]) < SHAFT.repeated, axis=1)
-        alike[0] = True  # also where a speed is not finite
-        group[left[alike]] = number
-        number += 1
-    return group.tolist()
-
-
-def _mark(direction: float, speed: Numbers) -> tuple[float, ...]:
-    """What is alike of two halves of motions that repeat each other."""
-    width, mean = max(1, len(speed) // 8), float(np.mean(speed))
-    ends = float(np.mean(speed[:width])) / mean, float(np.mean(speed[-width:])) / mean
-    return 9.0 * math.copysign(1.0, direction), math.log(len(speed)), math.log(mean), *ends
 
 
 def _few(freedom: float) -> float:
