@@ -1,7 +1,6 @@
 """Configurations: one ROS parameter file with the values of every node, read without ROS."""
 
 import difflib
-import hashlib
 import os
 import sys
 import textwrap
@@ -35,12 +34,10 @@ class Configuration(NamedTuple):
     path : of the file.
     sections : flat ``{dotted name: value}`` of every section; '/**' is shared, the others are
         named like their node.
-    written : the text of the file if nothing was replaced and ROS can read it, '' otherwise.
     """
 
     path: Path
     sections: Mapping[str, Mapping[str, Any]]
-    written: str = ""
 
     @classmethod
     def load(cls, path: str | Path) -> "Configuration":
@@ -57,11 +54,9 @@ class Configuration(NamedTuple):
         file, holds only what differs from that one: values, and sections of nodes that the base does not have.
         """
         path = Path(path)
-        (first, text, tree), *overlays = reversed(_chain(path))
-        sections = _sections(first, tree)
-        is_mixed = any(_is_mixed(value) for flat in sections.values() for value in flat.values())
-        whole = cls(first, sections, "" if is_mixed else text)
-        for overlay, _, changes in overlays:
+        (first, tree), *overlays = reversed(_chain(path))
+        whole = cls(first, _sections(first, tree))
+        for overlay, changes in overlays:
             whole = whole.with_sections(_sections(overlay, changes, whole=False), overlay)
         return whole
 
@@ -71,13 +66,12 @@ class Configuration(NamedTuple):
 
     @property
     def text(self) -> str:
-        """YAML with these values, as ROS reads them; the file's own text if nothing was replaced."""
-        return self.written or _text(self.sections)
-
-    @property
-    def sha256(self) -> str:
-        """Checksum of `text`, hexadecimal."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
+        """YAML with these values as ROS reads them: no aliases, and no list of whole and other numbers."""
+        tree = {}
+        for name, flat in self.sections.items():
+            values = {key: list(map(float, value)) if _is_mixed(value) else value for key, value in flat.items()}
+            tree[name if name == SHARED else f"{SHARED}/{name}"] = {PARAMETERS: nested(values)}
+        return yaml_text.dump(tree)
 
     @property
     def shared(self) -> Shared:
@@ -177,7 +171,7 @@ class Configuration(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle plain mappings: read-only ones cannot be pickled, and are made read-only again on the other side."""
-        return _thawed, (self.path, {name: dict(flat) for name, flat in self.sections.items()}, self.written)
+        return _thawed, (self.path, {name: dict(flat) for name, flat in self.sections.items()})
 
     def _section(self, node: str) -> str:
         if node == SHARED or node not in self.sections:
@@ -212,7 +206,7 @@ def files_of(path: str | Path) -> list[Path]:
     ParameterError
         as `Configuration.load`.
     """
-    return [one for one, _, _ in _chain(Path(path))]
+    return [one for one, _ in _chain(Path(path))]
 
 
 def differences(path: Path, loaded: Configuration) -> list[str]:
@@ -337,21 +331,20 @@ def _may_be(entry: str, name: str) -> bool:
     return entry == name or ":" in entry
 
 
-def _chain(path: Path, above: tuple[Path, ...] = ()) -> list[tuple[Path, str, Any]]:
-    """A file and those that it builds on, its base, the base of that and so on, with text and further content."""
+def _chain(path: Path, above: tuple[Path, ...] = ()) -> list[tuple[Path, Any]]:
+    """A file and those that it builds on, its base, the base of that and so on, with their further content."""
     if not path.is_file():
         raise ParameterError(f"configuration {path} is not a file; give the path of a ROS parameter file (YAML)")
     try:
-        text = path.read_text(encoding="utf-8")
-        tree = yaml_text.parse(text)
+        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
         raise ParameterError(f"configuration {path} is not a text file: {error}") from error
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
     if not isinstance(tree, dict) or BASE not in tree:
-        return [(path, text, tree)]
+        return [(path, tree)]
     base = _base(path, tree.pop(BASE), above)
-    return [(path, text, tree), *_chain(base, (*above, path.resolve()))]
+    return [(path, tree), *_chain(base, (*above, path.resolve()))]
 
 
 def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
@@ -395,8 +388,8 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     return _frozen(sections)
 
 
-def _thawed(path: Path, sections: Mapping[str, Mapping[str, Any]], written: str) -> Configuration:
-    return Configuration(path, _frozen(sections), written)
+def _thawed(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
+    return Configuration(path, _frozen(sections))
 
 
 def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:
@@ -406,11 +399,3 @@ def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[s
 def _is_mixed(value: Any) -> bool:
     """Whether a value is a list of whole and other numbers, which ROS refuses."""
     return isinstance(value, list) and {int, float} == {type(each) for each in value}
-
-
-def _text(sections: Mapping[str, Mapping[str, Any]]) -> str:
-    tree = {}
-    for name, flat in sections.items():
-        values = {key: list(map(float, value)) if _is_mixed(value) else value for key, value in flat.items()}
-        tree[name if name == SHARED else f"{SHARED}/{name}"] = {PARAMETERS: nested(values)}
-    return yaml_text.dump(tree)

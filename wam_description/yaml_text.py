@@ -78,9 +78,16 @@ def _require_plain(text: str) -> None:
             raise yaml.YAMLError(f"it is nested more than {FILES.deepest} levels deep")
 
 
+class _WithoutAliases(_DUMPER):
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
 def dump(tree: Any) -> str:
-    """YAML of plain values: mappings in their own order, lists of numbers in a line."""
-    written = yaml.dump(tree, Dumper=_DUMPER, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
+    """YAML of plain values: mappings in their own order, lists of numbers in a line, no aliases, which ROS refuses."""
+    written = yaml.dump(
+        tree, Dumper=_WithoutAliases, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+    )
     return str(written)
 
 

@@ -9,8 +9,7 @@ import yaml
 from wam_control.task.scenario import load, script_file
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
-from wam_description.parameters import ParameterError, values
-from wam_description.yaml_text import parameter_text
+from wam_description.parameters import ParameterError, listed, values
 from wam_live.thresholds import LIVE
 from wam_ros.bring_up import NodeProcess
 
@@ -54,8 +53,9 @@ class ScenarioPlayer:
             load(file, self._shared)
         except ParameterError as error:
             return str(error)
-        text = parameter_text({f"/**/{NODE}": {**values(self._shared), "script": str(Path(file).resolve())}})
-        self._node = NodeProcess(Configuration(file, {}, text), [NODE], self._namespace)
+        flat = {name: listed(value) for name, value in values(self._shared).items()}
+        own = Configuration(file, {NODE: {**flat, "script": str(Path(file).resolve())}})
+        self._node = NodeProcess(own, [NODE], self._namespace)
         return ""
 
     def ended(self) -> str:
