@@ -26,7 +26,7 @@ class Cables:
     damping: tuple[float, ...] = parameter("material damping of the circuit, motor side", "N m s/rad", high=100.0)
     reducer: tuple[str, ...] = parameter("location of the speed reducer", choices=("joint", "motor"))
     stage_motors: tuple[str, ...] = parameter(
-        "motor to which each stage belongs; its stages in order from the motor to the joint"
+        "motor to which each stage belongs; the stages of a motor in order, from the motor to the joint"
     )
     stage_ea: tuple[float, ...] = parameter("elastic modulus times area, E A, of one cable of the stage", "N", low=1.0)
     stage_length: tuple[float, ...] = parameter("free length of a strand", "m", high=10.0)

@@ -12,17 +12,17 @@ from wam_description.reasons import Reason
 REASONS: Final = {
     Reason.MOMENT_ONLY: "on this link only the moment is measured, so the contact position is unknown and the force is "
     "a lower bound",
-    Reason.BENT: "elbow at 90 deg and force in plane: contact position and force cannot be separated",
-    Reason.STRAIGHT: "elbow straight and force out of plane: contact position and force cannot be separated",
+    Reason.BENT: "elbow at 90 deg and force in the plane of the arm: contact position and force cannot be separated",
+    Reason.STRAIGHT: "elbow straight and force across the plane of the arm: contact position and force cannot be "
+    "separated",
     Reason.SHOULDER: "in this pose, one moment at the shoulder is not measured",
     Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
     Reason.ELBOW: "torque of the elbow near 0: contacts near the elbow and on the inner link cannot be distinguished",
-    Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
+    Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "one contact does not explain the torques",
     Reason.ALONG: "the force may also act along this link: then the torques show neither its position nor the link",
-    Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is 1 minus the sum of those "
-    "of the links",
+    Reason.PAYLOAD: "a picked-up payload may explain the torques; its probability is 1 minus those of the links",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "the arm is braked",
 }
@@ -44,8 +44,14 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
         "end the command and tare in free space ('wam call tare'), or declare the load of a real arm (arm.payload)",
     ),
     "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
-    "slow_arm": ("the slow approach to this force", "declare guard.contact_stiffness, or raise limits.settling_time"),
-    "shaking_arm": ("the vibration of the arm", "use joint sensors, or declare guard.contact_stiffness"),
+    "slow_arm": (
+        "the slow approach to this force",
+        "set guard.contact_stiffness to that of the surface, or raise limits.settling_time",
+    ),
+    "shaking_arm": (
+        "the vibration of the arm",
+        "use joint sensors, or set guard.contact_stiffness to that of the surface",
+    ),
 }
 INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
     ("torques", "sensors"): "tare in free space, or command fewer forces at once",
@@ -97,16 +103,16 @@ SENTENCES: Final = {  # by cause
     "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {step}: make its "
     "steps faster, or run it in its own process",
     "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
-    "simulation": "the simulation of the arm failed: {trouble}; the arm is where it was before; {cure}, or lower "
-    "timing.period",
+    "simulation": "the simulation of the arm failed: {trouble}; the arm is back where it was before this step; "
+    "{cure}, or lower timing.period",
     "limit": "{excess}; {cure}",
     "broken": "{excess} while the brakes hold; check the cable",
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one, then reset_fault",
-    "stopped": "{nodes} has stopped or is very slow: {topics} too old; start it again, or end other programs where the "
-    "computer is busy, then reset_fault",
-    "long_step": "{step}: {topics} too old; make its steps faster, then reset_fault",
+    "stopped": "{nodes} has stopped or is very slow: no new {topics}; start it again, or end other programs if "
+    "the computer is busy, then reset_fault",
+    "long_step": "{step}: no new {topics}; make its steps faster, then reset_fault",
     "ended": "{node} has ended; start it again, then reset_fault",
 }
 HOLDING: Final = "; the arm holds its position"

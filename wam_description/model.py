@@ -27,13 +27,13 @@ class LinkModel:
 class MotorModel:
     """Inertia and friction of the rotors.
 
-    Friction against positive motion v is F_c + (F_s - F_c) exp(-(v/v_s)^2) + k |tau| + b v with the torque tau that the
-    cables transmit; F_c, F_s and k have a value for each direction.
+    Friction against positive motion v is F_d + (F_s - F_d) exp(-(v/v_s)^2) + k |tau| + b v with the torque tau that the
+    cables transmit; F_d, F_s and k have a value for each direction.
     """
 
     inertia: tuple[float, ...] = like(Motors, "arm.motors.inertia")
     coulomb_positive: tuple[float, ...] = like(
-        Motors, "arm.motors.dynamic_friction", "dynamic friction F_c in positive motion"
+        Motors, "arm.motors.dynamic_friction", "dynamic friction F_d in positive motion"
     )
     coulomb_negative: tuple[float, ...] = like(Motors, "arm.motors.dynamic_friction", "the same in negative motion")
     static_positive: tuple[float, ...] = like(
@@ -57,7 +57,7 @@ class JointModel:
     coulomb: tuple[float, ...] = like(
         Joints,
         "arm.joints.dynamic_friction",
-        "dynamic friction F_c; if identified, 0 at a joint with its own motor, whose friction includes it",
+        "dynamic friction F_d; once identified, 0 at a joint with its own motor, whose friction includes it",
     )
     static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
     viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")

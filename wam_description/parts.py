@@ -69,7 +69,7 @@ class Joints:
         """Why a posture (n,), rad, is refused: the first joint beyond its stops; '' where none is."""
         for name, angle, low, high in zip(self.names, posture, self.lower, self.upper, strict=True):
             if not low <= angle <= high:
-                return f"{name} is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad"
+                return f"{name} is commanded to {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad"
         return ""
 
 

@@ -233,8 +233,8 @@ TOPICS: Final = (
     _joints(
         "joint_posture_command",
         "outer",
-        "joint angles, rad; the arm holds them, but not along a commanded force; if they move, also their velocity, "
-        "rad/s",
+        "joint angles, rad; the arm holds them, but not along a commanded force; for a moving "
+        "posture also its velocity, rad/s",
     ),
     Topic(
         "joint_trajectory",

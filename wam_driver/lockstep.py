@@ -19,7 +19,7 @@ def unpublished(found: Mapping[str, Sequence[str]]) -> str:
     which = " and ".join(topics)
     if not node:
         return f"list a node in 'nodes' that publishes {which}"
-    return f"{node} runs, but did not publish {which}: let each of its steps return that"
+    return f"{node} runs, but did not publish {which}: each of its steps must return that"
 
 
 class Lockstep:

@@ -153,6 +153,6 @@ def _taken(domain: int, namespace: str, name: str) -> str:
     where = f"in namespace {namespace} of ROS domain {domain}" + (f" (process {pid})" if pid else "")
     return (
         f"node '{name}' already runs {where}; "
-        "stop it, or take another ROS_DOMAIN_ID, or give the nodes of a second arm a namespace: "
+        "stop it, or use another ROS_DOMAIN_ID, or give the nodes of a second arm a namespace: "
         "wam up --namespace other, for one node -r __ns:=/other"
     )

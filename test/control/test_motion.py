@@ -77,7 +77,7 @@ def test_times_and_velocities_are_kept() -> None:
 @pytest.mark.parametrize(
     ("points", "reason"),
     [
-        ([PathPoint((9.0, -1.2, 0.2, 0.3))], "the trajectory: joint1 is to be at 9 rad"),
+        ([PathPoint((9.0, -1.2, 0.2, 0.3))], "the trajectory: joint1 is commanded to 9 rad"),
         ([PathPoint((0.5, -1.2, 0.2, 0.3), (), 0.2)], "joint1 of the trajectory reaches 4.69 rad/s; allowed: 1.2"),
         ([PathPoint(tuple(START), (), 1.0), PathPoint(tuple(START), (), 0.5)], "have to rise"),
         ([PathPoint((0.1, -1.2, 0.2, 0.3), (0.1, 0.0, 0.0, 0.0), 1.0)], "has to end at rest"),

@@ -242,7 +242,7 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
         (
             {**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]},
-            "posture: joint2 is to be at -9 rad; allowed: -2.356 to",
+            "posture: joint2 is commanded to -9 rad; allowed: -2.356 to",
         ),
         ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
         ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable, tare"),
@@ -588,7 +588,7 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
         (ScenarioStep("go", 1.0, force=cast(Any, [1.0, 2.0])), r"force is .*; give a ForceCommand\("),
         (ScenarioStep("go", 1.0, push=Push("outer_link", 2.0, ZERO, 0.0, 1.0)), "contact_position is 2 m; outer_link"),
         (task(PRESSING._replace(position=2.0)), "axis 1: contact_position is 2.0 m; allowed: 0 to"),
-        (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is to be at 9.0 rad; allowed"),
+        (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is commanded to 9.0 rad; allowed"),
         (task(), "the task has no axes; give at least one, or no task"),
         (setting("force_loop", "posture_gain", -1.0), "set, force_loop: parameter 'posture_gain' is -1.0 1/s; allowed"),
         (ScenarioStep("go", 1.0, settings=cast(Any, None)), r"settings is None; it must be a list of Setting\("),

@@ -76,7 +76,7 @@ def test_a_torque_is_a_force_of_each_joint(tmp_path: Path) -> None:
             {"tip": [0.5, 0.0, 0.0], "task": {"axes": [{"position": 0, "joint": f"joint{k}"} for k in (1, 2, 3, 4)]}},
             "tip and task are given; the task leaves no joint free to move; give one of them, or a task with fewer",
         ),
-        ({"trajectory": {"postures": [[9.0, 0.0, 0.0, 0.0]]}}, "posture: joint1 is to be at 9 rad"),
+        ({"trajectory": {"postures": [[9.0, 0.0, 0.0, 0.0]]}}, "posture: joint1 is commanded to 9 rad"),
     ],
 )
 def test_what_a_file_may_not_have_is_refused_with_what_is_allowed(keys: dict, reason: str, tmp_path: Path) -> None:

@@ -262,7 +262,7 @@ def test_a_posture_beyond_the_joint_limits_is_refused_by_name_and_the_last_one_h
     assert admitted(admission, posture=good).posture == good
     found = admitted(admission, posture=[0.1, -2.5, 0.0, 0.6])
     assert found.posture == good
-    refused = "joint2 is to be at -2.5 rad; allowed: -2.356 to 2.356 rad"
+    refused = "joint2 is commanded to -2.5 rad; allowed: -2.356 to 2.356 rad"
     assert refused in sentence(found.refusals["joint_posture_command"])
     assert admitted(admission, posture=[0.1, 1e300, 0.0, 0.6]).refusals
     assert not admitted(admission, posture=list(ARM.joints.upper)).refusals

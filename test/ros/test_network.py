@@ -329,7 +329,7 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     assert (
         f"node 'velocity_loop' already runs in namespace /wam of ROS domain {domain_id} (process {os.getpid()})" in line
     )
-    assert "stop it, or take another ROS_DOMAIN_ID" in line
+    assert "stop it, or use another ROS_DOMAIN_ID" in line
     require_places(["velocity_loop"], "wam")
 
 

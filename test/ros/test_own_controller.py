@@ -180,7 +180,7 @@ def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(config
     good = effort(5_000_000, [0.0, -1.3, 0.0, 0.9])
     assert loop.refusals == {}
     assert effort(10_000_000, [0.0, 9.0, 0.0, 0.9]) == good
-    assert "joint2 is to be at 9 rad; allowed: " in loop.refusals["joint_posture_command"]
+    assert "joint2 is commanded to 9 rad; allowed: " in loop.refusals["joint_posture_command"]
 
 
 def publishing(topic: str) -> Any:
@@ -432,7 +432,7 @@ def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_t
     plan = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("wait", 2.0)]
     run = Simulation(without(wam, "gravity"), plan, {"my_gravity": silent})
     failure = run.play()
-    assert "my_gravity runs, but did not publish gravity_effort: let each of its steps return that" in failure
+    assert "my_gravity runs, but did not publish gravity_effort: each of its steps must return that" in failure
     assert run.driver.safety.fault in failure
 
 

@@ -26,6 +26,7 @@ WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `wam guard` to its parser."""
     take_configuration(parser, default=None)
+    parser.epilog = f"Without options: the packaged arm, {BASE_CONFIGURATION}."
     own = parser.add_argument_group(
         "a force loop of your own", "give the first six, all in rotary or all in linear units"
     )

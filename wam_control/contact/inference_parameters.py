@@ -14,9 +14,9 @@ class InferenceParameters:
     )
     force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
-        "sd of the distance between the line of the force and the tube's axis, per radius", high=2.0
+        "sd of the distance between the line of the force and the tube's axis, as a fraction of its radius", high=2.0
     )
-    friction: float = parameter("sd of the friction force along a cover, per force", high=2.0)
+    friction: float = parameter("sd of the friction force along a cover, as a fraction of the force", high=2.0)
     end_weight: float = parameter("relative frequency of contacts where two links meet, for each of the two", high=1e3)
     along_weight: float = parameter(
         "relative frequency of forces along the last link: on its surface, and on its end",

@@ -16,47 +16,47 @@ class ObserverParameters:
         high=1.0,
     )
     mass_scale: tuple[float, ...] = parameter(
-        "ratio of nominal to configured mass and inertia of each link", low=0.1, high=10.0
+        "factor on mass and inertia of each link in the estimator's model", low=0.1, high=10.0
     )
-    friction_scale: float = parameter("ratio of nominal to configured friction", high=10.0)
-    mass_uncertainty: float = parameter("sd of the model torques of gravity and of inertia, per torque", high=1.0)
+    friction_scale: float = parameter("factor on the friction in the estimator's model", high=10.0)
+    mass_uncertainty: float = parameter("sd of the model torques of gravity and of inertia, as a fraction", high=1.0)
     centre_uncertainty: float = parameter("sd of each coordinate of the centre of mass of each link", "m", high=1.0)
     moving_uncertainty: float = parameter(
-        "sd of the friction of a moving shaft at the start, before it is tracked, per dynamic friction", high=10.0
+        "sd of the friction of a moving shaft at the start, before it is tracked, as a fraction", high=10.0
     )
     asymmetry_uncertainty: float = parameter(
-        "sd of the difference of each direction from the common friction, per dynamic friction", high=10.0
+        "sd of the difference of each direction from the common friction, as a fraction", high=10.0
     )
     load_uncertainty: float = parameter(
         "sd of the friction of a motor, and of a joint that several drive, per transmitted torque",
         high=1.0,
     )
-    torque_scale_uncertainty: float = parameter("sd of a motor's torque constant, per constant", high=1.0)
+    torque_scale_uncertainty: float = parameter("sd of a motor's torque constant, as a fraction", high=1.0)
     torque_delay_uncertainty: float = parameter(
         "sd of the delay of the motor torques with respect to the motor angles; one delay for all motors",
         "s",
         high=0.1,
     )
     shape_uncertainty: float = parameter(
-        "sd of the friction of a slow shaft, per static friction",
+        "sd of the friction of a slow shaft, as a fraction of static friction",
         high=10.0,
     )
     payload_uncertainty: float = parameter("sd of the mass at the tool where no payload is declared", "kg", high=50.0)
-    drift: float = parameter("drift of these model errors within a second, per standard deviation", high=10.0)
-    rest_uncertainty: float = parameter("sd of the friction of a shaft at rest, per static friction", high=10.0)
+    drift: float = parameter("random drift of these model errors in one second, as a fraction of their sd", high=10.0)
+    rest_uncertainty: float = parameter(
+        "sd of the friction of a shaft at rest, as a fraction of static friction", high=10.0
+    )
     motor_rest_velocity: float = parameter(
-        "motor speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
+        "motor speed from which Coulomb friction has its full size", "rad/s", low=1e-6, high=100.0
     )
-    joint_rest_velocity: float = parameter(
-        "joint speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
-    )
+    joint_rest_velocity: float = parameter("the same of a joint", "rad/s", low=1e-6, high=100.0)
     friction_memory: float = parameter(
         "time constant with which the friction of a shaft that came to rest becomes unknown", "s", low=1e-4, high=1.0
     )
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
-    motor_torque_fraction: float = parameter("sd of the motor torques per torque", high=1.0)
+    motor_torque_fraction: float = parameter("further sd of the motor torques, as a fraction", high=1.0)
     motor_noise: float = parameter(
-        "sd of the torque of a moving motor at the start, per dynamic friction; afterwards it is tracked",
+        "sd of the torque of a moving motor at the start, as a fraction of dynamic friction; afterwards it is tracked",
         high=10.0,
     )
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6, high=100.0)

@@ -32,7 +32,7 @@ class SensingParameters:
 
     torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True)
     torque_fraction: float = parameter(
-        "further sd of each measured joint torque, per torque of the commanded force", high=1.0, live=True
+        "further sd of each measured joint torque, as a fraction of that of the commanded force", high=1.0, live=True
     )
     estimated_torque_sd: float = parameter(
         "as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True
@@ -42,7 +42,9 @@ class SensingParameters:
         high=1.0,
         live=True,
     )
-    friction: float = parameter("sd of the tangential force on the link, per commanded force", high=2.0, live=True)
+    friction: float = parameter(
+        "sd of the tangential force on the link, as a fraction of the commanded force", high=2.0, live=True
+    )
     zero_limit: float = parameter(
         "largest external torque of a joint that counts as zero when a force begins at rest without an "
         "estimated contact; 0: none",

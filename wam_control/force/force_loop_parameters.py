@@ -84,8 +84,8 @@ class LimitParameters:
         live=True,
     )
     slide_speed: float = parameter(
-        "largest speed of the surface across the force; a sloping surface approaches the arm while friction reverses, "
-        "which counts as an error",
+        "largest speed of the surface across the force; if it slopes, it also moves along the force, which "
+        "counts as an error",
         "m/s",
         high=10.0,
         live=True,

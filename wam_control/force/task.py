@@ -225,7 +225,7 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         low, high = joints.lower[axis.joint], joints.upper[axis.joint]
         require(
             not is_place or axis.value is None or low <= axis.value <= high or not _is_held(axis),
-            f"{where}: {joints.names[axis.joint]} is to be at {axis.value} rad; allowed: {low:.4g} to {high:.4g}",
+            f"{where}: {joints.names[axis.joint]} is commanded to {axis.value} rad; allowed: {low:.4g} to {high:.4g}",
         )
         return axis
     require(any(direction), f"{where}: along is {direction}; give a direction that is not zero")
