@@ -61,8 +61,7 @@ class Effects:
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0, live=True
     )
     terminated: bool = parameter(
-        "true if the cables end on both pulleys, which bounds their creep (6.4.3): each part creeps by half of "
-        "(6.19), and only once for each load under which it is wound",
+        "true if the cables end on both pulleys, which bounds their creep (6.4.3), as docs/plant.md states",
         default=False,
     )
     capstan: float = parameter(

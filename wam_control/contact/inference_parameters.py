@@ -23,8 +23,7 @@ class InferenceParameters:
         high=1e3,
     )
     payload_weight: float = parameter(
-        "relative frequency of a mass that is picked up at the tool; the weights of the links add up to 2.65, so 0.1 "
-        "is one of 28 contacts",
+        "relative frequency of a mass that is picked up at the tool",
         high=1e3,
     )
     fusion_time: float = parameter(
