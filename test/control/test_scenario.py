@@ -694,7 +694,7 @@ def test_a_step_made_in_python_sets_the_parameters_of_a_controller_that_takes_th
 
     sections = {**CONFIGURATION.sections, "force_loop": {"stride": 1.0}}
     steps = [setting("force_loop", "stride", 2.0)._replace(seconds=0.1)]
-    run = Simulation(CONFIGURATION._replace(sections=sections, written=""), steps, {"force_loop": Tunable})
+    run = Simulation(CONFIGURATION._replace(sections=sections), steps, {"force_loop": Tunable})
     assert run.play() == ""
     assert run.nodes["force_loop"].own.stride == 2.0
 
