@@ -16,6 +16,7 @@ from wam_control.force.command_run import Shaking
 from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import ForceAxes, Phasors, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.limits import yielding
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_description.transmission_map import TransmissionMap
 
@@ -133,8 +134,9 @@ def test_a_joint_torque_is_known_as_its_joint_is() -> None:
 def test_a_stiff_surface_yields_as_the_cables_do() -> None:
     sensed = axis_at(POSES[0]).sensed
     assert sensed is not None
-    assert sensed.yielding(1e12) == pytest.approx(sensed.compliance)
-    assert sensed.yielding(4000.0) == pytest.approx(sensed.compliance + 1.0 / 4000.0)
+    stiff = replace(PLAIN, guard=replace(PLAIN.guard, contact_stiffness=1e12))
+    assert yielding(sensed, stiff) == pytest.approx(sensed.compliance)
+    assert yielding(sensed, PLAIN) == pytest.approx(sensed.compliance + 1.0 / 4000.0)
 
 
 @pytest.mark.parametrize("q", POSES)

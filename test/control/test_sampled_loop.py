@@ -41,7 +41,6 @@ def margin(
         move=np.array([[1.0 / LEVER]]),
         gain=np.array([gain]),
         proportional_gain=np.array([more.get("proportional", 0.0)]),
-        ahead=np.zeros((1, 1)),
         hold=np.zeros((1, 1)),
         filter_time=0.0,
         delay=more.get("delay", 0),

@@ -205,7 +205,7 @@ def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() 
 
 @pytest.mark.slow
 def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:
-    own = replace(OWN, force_gain=(0.08,))
+    own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
     before, report = loop.assessment, loop.report
     assert before is not None
@@ -226,7 +226,7 @@ def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:
 
 @pytest.mark.slow
 def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_off() -> None:
-    warned, silent = (Loop(guarded(replace(OWN, force_gain=(0.08,)), mode=mode)) for mode in ("warn", "off"))
+    warned, silent = (Loop(guarded(replace(OWN, force_gain=(0.09,)), mode=mode)) for mode in ("warn", "off"))
     for loop in (warned, silent):
         loop.retune_servo(STIFF)
     assert warned.report.is_warning
@@ -283,7 +283,7 @@ STIFF_POSE = (-0.5, -0.3, 0.3, 1.3)  # where the joint sensors see the foam thro
 
 @pytest.mark.slow
 def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_back() -> None:
-    own = replace(OWN, force_gain=(0.08,))
+    own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
     here = list(own.guard.posture)
     assert loop.report.facts["margin here, assessed"].startswith("not assessed yet, as no force was commanded")
@@ -328,7 +328,7 @@ def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, flo
 
 @pytest.mark.slow
 def test_the_velocity_obeys_the_factor() -> None:
-    loop = Loop(replace(OWN, force_gain=(0.08,), force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE))
+    loop = Loop(replace(OWN, force_gain=(0.09,), force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE))
     follow(loop, OWN.guard.posture)
     state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, 0.0, -6.0))
     speeds = []
@@ -356,7 +356,7 @@ def test_the_margin_of_a_joint_torque_follows_the_square_of_the_contact_position
 
     def margin(at: float) -> float:
         pressed = [
-            GuardedForces((each,), one, one, np.array([0.004]), np.zeros(1), 0.0 * one, 0.0 * one)
+            GuardedForces((each,), one, one, np.array([0.004]), np.zeros(1), 0.0 * one)
             for each in guard.contacts([0.0], "tube", at, 0.0)
         ]
         return min(guard.scales(task._replace(feedback=Feedback("contact_estimate", (), 0.0)), pressed))
@@ -368,7 +368,7 @@ def test_the_margin_of_a_joint_torque_follows_the_square_of_the_contact_position
 
 @pytest.mark.slow
 def test_a_force_that_turns_is_judged_again_though_the_arm_is_at_rest() -> None:
-    own = guarded(replace(OWN, force_gain=(0.08,)), mode="warn")
+    own = guarded(replace(OWN, force_gain=(0.09,)), mode="warn")
     along_y, along_z = (0.0, -6.0, 0.0), (0.0, 0.0, -6.0)
     fresh = {}
     for force in (along_y, along_z):

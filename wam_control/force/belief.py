@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import is_too_slow
+from wam_control.force.limits import is_too_slow, yielding
 from wam_control.force.thresholds import FORCE
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def predicted(
     sensed = axis.sensed
     if sensed is None or sensed.force_sd == math.inf:
         return Errors(torques=math.inf)
-    limits, soft = own.limits, sensed.yielding(own.guard.contact_stiffness)
+    limits, soft = own.limits, yielding(sensed, own)
     pace = max(own.force_gain) * sensed.speed_fraction
     settling = FORCE.settled * soft / pace if pace else math.inf
     slope = FORCE.friction_turn * FORCE.surface_slope * limits.slide_speed / soft

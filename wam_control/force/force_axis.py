@@ -107,10 +107,6 @@ class ForceAxis(NamedTuple):
     precision: Array
     covariance_there: Array
 
-    def yielding(self, stiffness: float) -> float:
-        """How far a surface of this stiffness, N/m, and the cables yield to a force, m/N."""
-        return 1.0 / stiffness + self.compliance
-
     def error(self, torque_sd: Array | float) -> float:
         """Standard deviation of the force, N, by those of the torques (n,), or of each of them, N m."""
         return float(np.linalg.norm(self.sense * torque_sd))

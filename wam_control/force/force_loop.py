@@ -454,11 +454,7 @@ class ForceLoop:
             one.is_kept = one.watch.touch.is_there and abs(error) < band
             if one.is_kept:
                 return 0.0
-        ahead = 0.0  # force that the motion of the arm has changed since: the low pass keeps it back
-        if one.watch.touch.is_there:
-            yielding = axis.sensed.yielding(own.guard.contact_stiffness)
-            ahead = float(axis.along @ self._measurement.ahead) / yielding
-        speed = factor * one.watch.oscillation.share * law.velocity(0, error - ahead, before - ahead, dt)
+        speed = factor * one.watch.oscillation.share * law.velocity(0, error, before, dt)
         if axis.desired:  # back no faster than the measured force can follow
             slack = servo_yielding(axis, self._supervision.servo_stiffness, own)
             most = approach_speed(axis, one.watch.touch.is_there, own, slack)
@@ -518,7 +514,7 @@ class ForceLoop:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
         The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
-        The whole of it rises more slowly than the force may: the arm that it moves presses, too.
+        The whole of it rises as the force may.
         """
         own, run = self.parameters, self._run
         at_once, later = np.zeros(len(self._q)), np.zeros(len(self._q))
@@ -533,7 +529,7 @@ class ForceLoop:
         if own.limits.impact:
             missing = later - run.fed
             way, whole = (float(np.abs(one).max()) for one in (missing, [later, run.fed]))
-            run.fed += missing * min(whole * dt / (max(way, FORCE.negligible) * FORCE.fed * rise_time(own)), 1.0)
+            run.fed += missing * min(whole * dt / (max(way, FORCE.negligible) * rise_time(own)), 1.0)
         return at_once + run.fed
 
     def _watch_motions(

@@ -59,7 +59,6 @@ class ForceMeasurement:
     ----------
     torques : of the world on the joints, filtered.
     free : torques of the world on the joints (n,), N m, that counted as those of a free arm when they were taken.
-    ahead : motion of the joints (n,), rad, that the low pass of the torques does not show yet.
     rested : time for which the arm has been at rest, s.
     speed : mean speed of the fastest joint, rad/s; infinite where it is not known yet.
     """
@@ -78,8 +77,7 @@ class ForceMeasurement:
 
     def restart(self) -> None:
         """Forget the filtered torques."""
-        self._filters["torque"], self._filters["angle"] = LowPass(), LowPass()
-        self.ahead = self._none
+        self._filters["torque"] = LowPass()
         self.torques = WorldTorques(self._none, self._none, None, self._none)
 
     def step(
@@ -112,8 +110,6 @@ class ForceMeasurement:
         self._filters["steady"].step(torque, FORCE.steady_time, dt)
         self._external = torque - self._zeros
         counted = self._external if is_touched or not own.is_estimated else self._none
-        angle = np.array(joints.position)
-        self.ahead = angle - self._filters["angle"].step(angle, own.force_filter, dt)
         before = self._filters["torque"].value
         now = self._filters["torque"].step(counted, own.force_filter, dt)
         sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._torque_sd

@@ -51,15 +51,12 @@ def guarded(
         return []
     n = len(q)
     move, left = linear([axis.along for axis in axes], n)
-    hold, gain = own.posture_gain * left, np.zeros((2, len(axes)))
-    sense, ahead = np.zeros((len(axes), n)), np.zeros((len(axes), n))
+    hold, sense, gain = own.posture_gain * left, np.zeros((len(axes), n)), np.zeros((2, len(axes)))
     for i, axis in enumerate(axes):
         if axis.of.is_sensed:
             sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
-        if axis.is_force and axis.sensed is not None:
-            ahead[i] = axis.along / axis.sensed.yielding(own.guard.contact_stiffness)
-            move[:, i] *= axis.sensed.speed_fraction
         if axis.is_force:
+            move[:, i] *= 1.0 if axis.sensed is None else axis.sensed.speed_fraction
             gain[:, i] = supervision.gains(axis.of.joint, axis.in_frame.tolist())
         elif axis.of.kind is not AxisKind.VELOCITY:
             rate = own.task.largest_rate
@@ -67,4 +64,4 @@ def guarded(
                 damping = own.task.damping(axis.of)
                 rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
             hold = hold + rate * np.outer(move[:, i], axis.along)
-    return [GuardedForces(each, sense, move, gain[0], gain[1], ahead, hold) for each in together]
+    return [GuardedForces(each, sense, move, gain[0], gain[1], hold) for each in together]

@@ -39,6 +39,11 @@ def accelerated(low: Array, high: Array, before: Array, step: float) -> tuple[Ar
     return np.minimum(np.maximum(low, before - step), high), np.maximum(np.minimum(high, before + step), low)
 
 
+def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
+    """How far the stiffest surface and the cables yield to a force, m/N."""
+    return 1.0 / own.guard.contact_stiffness + sensed.compliance
+
+
 def latency(own: ForceLoopParameters) -> float:
     """By how much the measured force is late, s."""
     return own.force_filter + own.guard.feedback_lag * own.is_estimated
@@ -70,7 +75,7 @@ def approach_speed(
     if not limits.impact or sensed is None or place is None or not sensed.speed_fraction:
         return math.inf
     slowest = FORCE.creep / limits.settling_time
-    whole = axis.desired * sensed.yielding(own.guard.contact_stiffness)
+    whole = axis.desired * yielding(sensed, own)
     rise = rise_time(own) if place.is_known else max(FORCE.identified_rise, rise_time(own))
     if is_touching:
         return max((whole + axis.desired * servo_yielding) / sensed.speed_fraction / rise, slowest)
@@ -109,10 +114,7 @@ def is_too_slow(axis: CommandedAxis, own: ForceLoopParameters) -> bool:
 
 def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> float:
     """Error of a force, N, that is left alone: a smaller one than friction lets the arm correct."""
-    return min(
-        FORCE.kept * own.limits.tolerance * abs(desired),
-        FORCE.finest_motion / sensed.yielding(own.guard.contact_stiffness),
-    )
+    return min(FORCE.kept * own.limits.tolerance * abs(desired), FORCE.finest_motion / yielding(sensed, own))
 
 
 def certain_size(torques: Array, torque_sd: Array) -> float:
@@ -175,8 +177,6 @@ def followed(
     assert axis.sensed is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
     slide = FORCE.slide_slope * float(np.linalg.norm(body.point_jacobian(q, axis.place.cover, point) @ posture))
-    pace = min(
-        max(own.force_gain), axis.sensed.yielding(own.guard.contact_stiffness) / max(latency(own), FORCE.negligible)
-    )
+    pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(latency(own), FORCE.negligible))
     most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)
     return posture * (most / slide) if slide > most else posture

@@ -43,8 +43,6 @@ class Axes(NamedTuple):
     sense : (p, n), force of each axis, N or N m, per torque of the world on the joints.
     move : (n, p), joint velocity per velocity of each axis.
     gain, proportional_gain : (p,), G_I and G_P.
-    ahead : (p, n), force of each axis, N, per joint angle of the motors on a surface of the declared stiffness: what
-        the low pass keeps back of the force is taken from the motion.
     hold : (n, n), joint velocity per joint angle, by which the posture is held, 1/s.
     filter_time : time constant of the low pass on the force, s; the rate of G_P is taken behind it.
     delay : inner periods from the sample to the use of its command, whole outer periods included.
@@ -54,7 +52,6 @@ class Axes(NamedTuple):
     move: Array
     gain: Array
     proportional_gain: Array
-    ahead: Array
     hold: Array
     filter_time: float
     delay: int
@@ -138,24 +135,20 @@ class SampledLoop:
     def period(self, q: Sequence[float], axes: Axes, contact: Array, feedback: Feedback, scale: float) -> Array:
         """The map of one outer period with all gains times `scale`; arguments as in `margin`.
 
-        States: theta, thetad, q, qd, integrals of the velocity loop, filtered force, the force of the filtered motion,
-        joint velocities commanded one period ago, and those of the law still to come.
+        States: theta, thetad, q, qd, integrals of the velocity loop, filtered force, joint velocities
+        commanded one period ago, and those of the law still to come.
         """
         n, p = self._n, len(axes.gain)
         free, shown = self.plant(q, contact, feedback)
         drift, drive = zero_order_hold(free, self.inlet, self.tick)
         whole, late = divmod(axes.delay, self.divisor)
-        begins = np.cumsum([0, 4 * n, n, p, p, n, *[n] * whole]).tolist()
+        begins = np.cumsum([0, 4 * n, n, p, n, *[n] * whole]).tolist()
         state = np.eye(begins[-1])
-        x, integral, before, shifted, commanded, *earlier = (state[a:b] for a, b in pairwise(begins))
+        x, integral, before, commanded, *earlier = (state[a:b] for a, b in pairwise(begins))
         outer = self.tick * self.divisor
         lag = axes.filter_time + (feedback.lag if feedback.kind == "contact_estimate" else 0.0)
         force = before + (axes.sense @ shown @ x - before) * outer / (outer + lag)
-        moved = axes.ahead @ self.joint_from_motor @ x[:n]
-        shifted = shifted + (moved - shifted) * outer / (outer + axes.filter_time)
-        speed = (
-            axes.gain[:, None] * (force + moved - shifted) + axes.proportional_gain[:, None] * (force - before) / outer
-        )
+        speed = axes.gain[:, None] * force + axes.proportional_gain[:, None] * (force - before) / outer
         law = [*earlier, -scale * axes.move @ speed]
         command = law[0] - axes.hold @ (self.joint_from_motor @ x[:n])
         first, then = self.motor_from_joint @ commanded, self.motor_from_joint @ command
@@ -163,7 +156,7 @@ class SampledLoop:
             error = (first if tick < late else then) - x[n : 2 * n]
             integral = integral + self.ki * self.tick * error
             x = drift @ x + drive @ (self.kp * error + integral)
-        return np.vstack([x, integral, force, shifted, command, *law[1:]])
+        return np.vstack([x, integral, force, command, *law[1:]])
 
     def plant(self, q: Sequence[float], contact: Array, feedback: Feedback) -> tuple[Array, Array]:
         """Rate of the states theta, thetad, q, qd, (4n, 4n), and the torque that the feedback measures.

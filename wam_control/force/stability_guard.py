@@ -118,8 +118,7 @@ class GuardedForces(NamedTuple):
     Attributes
     ----------
     contacts : all of them, in one posture.
-    sense, move, gain, proportional_gain, ahead, hold : as in `wam_control.force.sampled_loop.Axes`, of all axes of the
-        task.
+    sense, move, gain, proportional_gain, hold : as in `wam_control.force.sampled_loop.Axes`, of all axes of the task.
     """
 
     contacts: tuple[GuardedContact, ...]
@@ -127,7 +126,6 @@ class GuardedForces(NamedTuple):
     move: Array
     gain: Array
     proportional_gain: Array
-    ahead: Array
     hold: Array
 
     @property
@@ -334,8 +332,7 @@ class StabilityGuard:
         lever = axis.lever
         hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / float(lever @ lever))
         gains = np.array([max(law.gain)]), np.array([max(law.proportional_gain)])
-        ahead = lever[None] / axis.yielding(self.parameters.contact_stiffness)
-        return Axes(axis.sense[None], axis.move[:, None], *gains, ahead, hold, task.filter_time, delay)
+        return Axes(axis.sense[None], axis.move[:, None], *gains, hold, task.filter_time, delay)
 
     def _stiffness(self, contact: GuardedContact) -> Array:
         lever = self.axis(contact).lever

@@ -44,7 +44,6 @@ class ForceThresholds:
     slow_posture: float = 0.2  # rad/s, below which a posture waits while a force is kept
     way_back: float = 3e-3  # m, way back from another link than commanded
     # feed-forward
-    fed: float = 2.0  # times the rise of a force, in which its torque rises
     friction_time: float = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters
     slow_motor: float = 0.04  # rad/s, of a motor, below which less of the dry friction is fed forward
     slow_joint: float = 0.002  # rad/s, the same of a joint
