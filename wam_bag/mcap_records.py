@@ -12,7 +12,6 @@ from mmap import mmap
 from typing import Any, Final, NamedTuple
 
 import lz4.frame
-import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream, RecordBuilder
@@ -30,14 +29,10 @@ FOOTER: Final = struct.Struct("<QQI")  # content: start of the summary, of its o
 FOOTER_SIZE: Final = HEAD.size + FOOTER.size
 LARGEST_CHUNK: Final = 2**28  # bytes, decompressed
 LARGEST_ATTACHMENT: Final = 2**28  # bytes
-_CHUNK: Final = struct.Struct("<QQQII")  # first and last log time, decompressed size, checksum, length of what follows
-_CHUNK_INDEX: Final = struct.Struct(
-    "<QQQQI"
-)  # first and last log time, start and length of the chunk, bytes of offsets
-_OFFSETS: Final = np.dtype([("channel", "<u2"), ("offset", "<u8")])
 _CLASSES: Final[dict[int, Any]] = {
     Opcode.HEADER: records.Header, Opcode.SCHEMA: records.Schema, Opcode.CHANNEL: records.Channel,
     Opcode.ATTACHMENT: records.Attachment, Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
+    Opcode.CHUNK: records.Chunk, Opcode.CHUNK_INDEX: records.ChunkIndex, Opcode.MESSAGE_INDEX: records.MessageIndex,
     Opcode.STATISTICS: records.Statistics, Opcode.METADATA: records.Metadata,
     Opcode.METADATA_INDEX: records.MetadataIndex,
 }  # fmt: skip
@@ -132,12 +127,15 @@ def chunk_of(record: RecordExtent, head: bytes) -> ChunkPlace:
 
 def chunk_index(content: bytes) -> ChunkPlace:
     """A chunk by its index record."""
-    first, last, start, length, offsets = _CHUNK_INDEX.unpack_from(content)
-    channels = np.frombuffer(content[_CHUNK_INDEX.size :][:offsets], _OFFSETS)["channel"]
-    (indexes,) = struct.unpack_from("<Q", content, _CHUNK_INDEX.size + offsets)
-    (size,) = struct.unpack_from("<Q", content, len(content) - 8)
-    end = start + length
-    return _checked(ChunkPlace(start, end, end + indexes, first, last, size, frozenset(channels.tolist())))
+    one: records.ChunkIndex = parsed(Opcode.CHUNK_INDEX, content)
+    start, end = one.chunk_start_offset, one.chunk_start_offset + one.chunk_length
+    channels = frozenset(one.message_index_offsets)
+    return _checked(
+        ChunkPlace(
+            start, end, end + one.message_index_length, one.message_start_time, one.message_end_time,
+            one.uncompressed_size, channels,
+        )
+    )  # fmt: skip
 
 
 def _checked(place: ChunkPlace) -> ChunkPlace:
@@ -161,29 +159,25 @@ def decompress(place: ChunkPlace, record: bytes, into: Bytes, zstd: zstandard.Zs
     where = f"the chunk at byte {place.start}"
     if record[: HEAD.size] != HEAD.pack(Opcode.CHUNK, len(record) - HEAD.size):
         raise Damage(f"{where} is not where its index has it")
-    first, last, size, crc, length = _CHUNK.unpack_from(record, HEAD.size)
-    if (first, last, size) != (place.first, place.last, place.size):
+    chunk: records.Chunk = parsed(Opcode.CHUNK, record[HEAD.size :])
+    described = chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size
+    if described != (place.first, place.last, place.size):
         raise Damage(f"{where} and its index differ")
-    begin = HEAD.size + _CHUNK.size
-    (compressed,) = struct.unpack_from("<Q", record, begin + length)
-    data = record[begin + length + 8 :]
-    if len(data) != compressed:
-        raise Damage(f"{where} ends early")
-    data = _decompressed(record[begin : begin + length], data, len(into) + 1, zstd)
+    data = _decompressed(chunk.compression, chunk.data, len(into) + 1, zstd)
     if len(data) != len(into):
         raise Damage(f"{where} holds {len(data)} bytes, or more, instead of {len(into)}")
-    if crc and crc != zlib.crc32(data):
+    if chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data):
         raise Damage(f"{where} does not match its checksum")
     into.data[:] = data
 
 
-def _decompressed(compression: bytes, data: bytes, most: int, zstd: zstandard.ZstdDecompressor) -> bytes:
+def _decompressed(compression: str, data: bytes, most: int, zstd: zstandard.ZstdDecompressor) -> bytes:
     """So many bytes of a chunk at most; the library's own decompression allocates what the data ask for."""
-    if compression == b"":
+    if compression == "":
         return data
-    if compression == b"zstd":
+    if compression == "zstd":
         with zstd.stream_reader(data) as stream:
             return stream.read(most)
-    if compression == b"lz4":
+    if compression == "lz4":
         return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
     raise Damage(f"a chunk is compressed with {compression!r}; 'zstd', 'lz4' and none are read")

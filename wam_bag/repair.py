@@ -2,13 +2,11 @@
 
 import contextlib
 import os
-import struct
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Message
 
@@ -22,7 +20,6 @@ from wam_bag.mcap_writer import McapWriter
 from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
 
 UNFINISHED: Final = ".repaired"  # suffix of a file while it is written
-_INDEX_HEAD: Final = struct.Struct("<HI")  # of a message index: channel, bytes of the entries
 
 
 class Repaired(NamedTuple):
@@ -163,9 +160,8 @@ class _Copy:
         found: dict[int, list[int]] = {}
         with contextlib.suppress(*BROKEN):
             for content in self._file.indexes_behind(position):
-                channel, _ = _INDEX_HEAD.unpack_from(content)
-                entries = np.frombuffer(content, "<u8", offset=_INDEX_HEAD.size)
-                found[channel] = entries.reshape(-1, 2)[:, 0].tolist()
+                index = parsed(Opcode.MESSAGE_INDEX, content)
+                found[index.channel_id] = [time for time, _ in index.records]
         return found
 
     def _losses(self) -> FileLosses:
