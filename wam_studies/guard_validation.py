@@ -86,8 +86,8 @@ class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
     seeds = (1,)
     base = "testbed"
 
-    sets: int = parameter("random sets for the exact integrator", low=1, default=200)
-    testbed: int = parameter("random sets for the testbed in MuJoCo", default=40)
+    sets: int = parameter("random sets of gains for the exact integrator", low=1, default=200)
+    testbed: int = parameter("random sets of gains for the testbed in MuJoCo", default=40)
 
     run = staticmethod(validate)
 

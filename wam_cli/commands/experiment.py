@@ -37,8 +37,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples",
         choices=("check", "make"),
-        help="check: compare the sample bags with their index in --directory (sizes, checksums); make: record and cut "
-        "them again; without experiment names: those of all experiments and tasks",
+        help="check: compare the sample bags with their index in --directory (sizes, checksums); make: record them "
+        "again; without experiment names: those of all experiments and tasks",
     )
     parser.add_argument(
         "--directory", type=Path, default=Path("bags"), help="directory for bags and pictures; default: bags"
