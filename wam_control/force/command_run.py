@@ -16,6 +16,7 @@ from wam_control.force.force_axis import ForceAxes, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
+from wam_control.force.limits import latency
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Covers, Servo, Timing
@@ -38,6 +39,7 @@ class AxisRun:
     watch, motion : what is reported of its force, or of its motion.
     anchor : position to hold where none is commanded, m or rad.
     wound_up : force, N, to which the velocity loops have wound up before its torque is fed forward; NaN until then.
+    rising : force, N, that is commanded by now: from the touch on it goes to the one that is desired.
     side : 1 or -1, on which side along it an impedance is touched.
     is_kept : whether its force is left as it is.
     """
@@ -48,7 +50,22 @@ class AxisRun:
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
         self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
+        self.rising = self._shown = 0.0
         self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
+
+    def expected(self, own: ForceLoopParameters, dt: float) -> float:
+        """Force, N, that the measurement shows if the force is as it is commanded by now.
+
+        The law would press too hard, if it compared a measured force that is late with a commanded one that is not.
+        """
+        desired = self.now.desired
+        if not (own.limits.impact and self.watch.touch.is_there):
+            self.rising = self._shown = self.known.force if own.limits.impact else desired
+            return desired
+        most = max(desired, self.rising) * dt / max(FORCE.ramp * latency(own), dt)
+        self.rising += min(max(desired - self.rising, -most), most)
+        self._shown += (self.rising - self._shown) * dt / (FORCE.shown * latency(own) + dt)
+        return self._shown
 
     def goal(self, axis: CommandedAxis, dt: float, lasting: float) -> float:
         """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""
@@ -135,7 +152,6 @@ class CommandRun:
     resting : torques at rest (n,), N m, that are the error of a model, not those of a touched surface.
     approached : way of the posture along the forces to what they touch (n,), rad.
     free_at, before : where the arm last was free, and a period ago (n,), rad; None at first.
-    fed : torque of the forces that is fed forward after the touch (n,), N m.
     is_moving : whether the arm still moves as it did when the command began.
     delayed : speeds along the axes that are still to come, m/s or rad/s.
     joints : what is reported of a posture, of each joint.
@@ -161,7 +177,7 @@ class CommandRun:
         self.approached = np.zeros_like(resting)
         self.free_at: Array | None = None
         self.before: Array | None = None
-        self.fed, self.is_moving = np.zeros_like(resting), is_moving
+        self.is_moving = is_moving
         self.still_sd = still_sd
         self.delayed: deque[list[float]] = deque()
         self.joints = {name: MotionWatch() for name in arm.joints.names}
@@ -170,12 +186,13 @@ class CommandRun:
         self.ways: Ways = {}
 
     def go_on(self, before: "CommandRun") -> None:
-        """Keep where the axes touch and hold that were commanded before, too, and the torque that is fed forward."""
+        """Keep where the axes touch and hold, and what they press with, that were commanded before, too."""
         for one in self.axes:
             for other in before.axes:
                 if (before.frame, other.of) == (self.frame, one.of):
                     one.place, one.anchor, one.wound_up = other.place, other.anchor, other.wound_up
-                    self.fed, self.feed_forward = before.fed, before.feed_forward
+                    one.rising, one._shown = other.rising, other._shown
+                    self.feed_forward = before.feed_forward
 
     @property
     def is_touching(self) -> bool:

@@ -36,7 +36,6 @@ from wam_control.force.limits import (
     followed,
     joint_bounds,
     resolution,
-    rise_time,
     servo_yielding,
 )
 from wam_control.force.problem import VelocityRow, solve
@@ -394,7 +393,7 @@ class ForceLoop:
             limits += self._at_ends(unlimited, velocity)
         effort = [0.0] * len(q)
         if axes and not holds:
-            fed = self._fed(dt)
+            fed = self._fed()
             effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces else fed.tolist()
         return velocity, effort, limits
 
@@ -445,16 +444,17 @@ class ForceLoop:
     def _force_speed(self, one: AxisRun, factor: float, dt: float) -> float:
         """The law of a force or a torque, as fast as the limits allow."""
         own, axis, known = self.parameters, one.now, one.known
-        error, before = axis.desired - known.force, axis.desired - known.before
         if axis.sensed is None:
+            error, before = axis.desired - known.force, axis.desired - known.before
             return factor * self._supervision.torque_law.velocity(axis.of.joint, error, before, dt)
-        law = self._supervision.force_law.along(axis.in_frame.tolist())
+        law, expected = self._supervision.force_law.along(axis.in_frame.tolist()), one.expected(own, dt)
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
-            one.is_kept = one.watch.touch.is_there and abs(error) < band
+            one.is_kept = one.watch.touch.is_there and abs(axis.desired - known.force) < band
             if one.is_kept:
                 return 0.0
-        speed = factor * one.watch.oscillation.share * law.velocity(0, error, before, dt)
+        error = expected - known.force
+        speed = factor * one.watch.oscillation.share * law.velocity(0, error, expected - known.before, dt)
         if axis.desired:  # back no faster than the measured force can follow
             slack = servo_yielding(axis, self._supervision.servo_stiffness, own)
             most = approach_speed(axis, one.watch.touch.is_there, own, slack)
@@ -510,27 +510,21 @@ class ForceLoop:
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _fed(self, dt: float) -> Array:
+    def _fed(self) -> Array:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
         The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
-        The whole of it rises as the force may.
         """
-        own, run = self.parameters, self._run
-        at_once, later = np.zeros(len(self._q)), np.zeros(len(self._q))
-        for one in run.axes:
+        own, fed = self.parameters, np.zeros(len(self._q))
+        for one in self._run.axes:
             axis = one.now
             if axis.is_force:
-                at_once += own.force_feedforward * axis.desired * axis.along
-                if run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
+                fed += own.force_feedforward * axis.desired * axis.along
+                if self._run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
                     if math.isnan(one.wound_up):
                         one.wound_up = one.known.force * own.is_estimated
-                    later += ((1.0 - own.force_feedforward) * axis.desired - one.wound_up) * axis.along
-        if own.limits.impact:
-            missing = later - run.fed
-            way, whole = (float(np.abs(one).max()) for one in (missing, [later, run.fed]))
-            run.fed += missing * min(whole * dt / (max(way, FORCE.negligible) * rise_time(own)), 1.0)
-        return at_once + run.fed
+                    fed += ((1.0 - own.force_feedforward) * one.rising - one.wound_up) * axis.along
+        return fed
 
     def _watch_motions(
         self,

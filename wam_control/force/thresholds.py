@@ -43,6 +43,9 @@ class ForceThresholds:
     slide_slope: float = 0.3  # of a surface along which a posture moves the link
     slow_posture: float = 0.2  # rad/s, below which a posture waits while a force is kept
     way_back: float = 3e-3  # m, way back from another link than commanded
+    # a force that is commanded, after the touch
+    ramp: float = 4.0  # latencies of the measured force, in which it goes to the one that is desired
+    shown: float = 2.0  # of these, after which it is measured: the arm follows late, too
     # feed-forward
     friction_time: float = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters
     slow_motor: float = 0.04  # rad/s, of a motor, below which less of the dry friction is fed forward
