@@ -333,8 +333,8 @@ def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(l
     defaults = {name: argument.default_value for name, argument in declared.items()}
     whole, note = start({**defaults, "trajectory_action": "false"})
     assert note.msg.startswith("no /tf: install tf2_msgs")
-    file = Path(whole.cmd[whole.cmd.index("--config") + 1])
-    assert file.read_text() == packaged("wam").read_text()
+    file = whole.cmd[whole.cmd.index("--config") + 1]
+    assert Configuration.load(file).sections == Configuration.load(packaged("wam")).sections
 
 
 def test_launch_plays_a_scenario_into_a_bag_with_values_of_its_own(launch_file, tmp_path):

@@ -310,7 +310,7 @@ def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Pat
 
 def test_a_bag_that_cannot_be_made_stops_the_node_before_it_starts(ros: Any, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ParameterError, match=r"is a file.*'directory'"):
+    with pytest.raises(ParameterError, match=r"Not a directory.*'directory'"):
         recorder(ros, tmp_path / "file")
     (tmp_path / "bag").mkdir()
     with pytest.raises(ParameterError, match=r"exists already.*'name'"):
