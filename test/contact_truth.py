@@ -66,14 +66,11 @@ def joint_torques(tau: np.ndarray) -> np.ndarray:
 
 
 class RigidArm:
-    """Links, pulleys and rotors on rigid cables, sliding friction at each motor and joint.
-
-    With a stiffness, (4,), N m/rad, the motors are ahead by the stretch of cables that swing not.
-    """
+    """Links, pulleys and rotors on rigid cables, sliding friction at each motor and joint."""
 
     SUBSTEPS = 4
 
-    def __init__(self, arm: Arm, q: Sequence[float], friction: float, stiffness: Sequence[float] = (math.inf,)) -> None:
+    def __init__(self, arm: Arm, q: Sequence[float], friction: float) -> None:
         rotor = arm.motors.inertia[0]
         reflected = (N1**2 * rotor, 2 * N2**2 * rotor, N2**2 / 2 * rotor, N4**2 * rotor)
         self.armature = np.array(arm.joints.armature) + reflected
@@ -85,8 +82,7 @@ class RigidArm:
         self._motor_viscous = friction * np.array(arm.motors.viscous_friction)
         self._joint = friction * np.array(arm.joints.dynamic_friction)
         self._joint_viscous = friction * np.array(arm.joints.viscous_friction)
-        self._carried, self._stretch, self._stretching = np.zeros(4), np.zeros(4), np.zeros(4)
-        self._stiffness = np.array(stiffness)
+        self._carried = np.zeros(4)
 
     def gravity(self) -> np.ndarray:
         """Torques that carry the arm where it is."""
@@ -105,12 +101,9 @@ class RigidArm:
             self._carried = joint_torques(tau_motor - friction) - own
             data.qfrc_applied[:] = self._carried + external
             mujoco.mj_step(self.model, data)
-        stretch = (tau_motor - friction) / self._stiffness
-        self._stretch, self._stretching = stretch, (stretch - self._stretch) / 1e-3
 
     def motors(self, tau_motor: np.ndarray) -> tuple[list[float], list[float], list[float]]:
-        theta = motor_from_joint(self.data.qpos) + self._stretch
-        thetad = motor_from_joint(self.data.qvel) + self._stretching
+        theta, thetad = motor_from_joint(self.data.qpos), motor_from_joint(self.data.qvel)
         return theta.tolist(), thetad.tolist(), tau_motor.tolist()
 
     def sensors(self) -> tuple[list[float], list[float], list[float]]:

@@ -165,6 +165,40 @@ def test_joint_sensors_locate_a_push_on_an_arm_in_motion() -> None:
     assert max(errors) < 0.005
 
 
+TILTED = (0.0, -1.05, 0.3, 0.9)
+
+
+@pytest.mark.slow
+def test_vibration_after_a_contact_is_no_new_one() -> None:
+    """At 60 Hz, which passes the faster filter: after a contact it is that of the cables, later a contact."""
+    smooth = dataclasses.replace(MOTORS, observer=dataclasses.replace(MOTORS.observer, shape_uncertainty=0.0))
+    transmission, body = TransmissionMap.of(ARM), RigidBody(ARM, MOTORS.observer.mass_scale)
+    pose, speed, rest = np.array(TILTED), [1.0, -1.2, 2.0, 1.5], np.zeros(4)
+    lever = body.cover_jacobian(pose, "outer_link").T @ (0.0, 0.0, 1.0, 0.0, -0.28, 0.0)
+
+    def play(estimator: ContactEstimator, span: float, force: float, vibration: float) -> list[ContactEstimate]:
+        found = []
+        for tick in range(round(span / DT)):
+            np.add(pose, DT * np.array(transmission.joint_velocities(speed)), out=pose)
+            pushed = force + vibration * min(1.0, tick / 100) * math.sin(2.0 * math.pi * 60.0 * tick * DT)
+            torque = transmission.motor_torques((body.gravity_torque(pose) + rest - pushed * lever).tolist())
+            assert estimator.observe(State(transmission.motor_positions(pose.tolist()), speed, torque), None, DT)
+            if tick % OUTER == 0:
+                found.append(estimator.estimate())
+        return found
+
+    rest = np.array(play(ContactEstimator(ARM, TIMING, smooth), 0.2, 0.0, 0.0)[-1].external_torques)
+    estimator = ContactEstimator(ARM, TIMING, smooth)
+    assert not any(estimate.in_contact for estimate in play(estimator, 0.2, 0.0, 0.0))
+    assert play(estimator, 0.3, 20.0, 0.0)[-1].in_contact
+    assert not play(estimator, 0.1, 0.0, 0.0)[-1].in_contact
+    assert not any(estimate.in_contact for estimate in play(estimator, 0.18, 0.0, 40.0))
+    assert not any(estimate.in_contact for estimate in play(estimator, 0.2, 0.0, 0.0))
+    estimator = ContactEstimator(ARM, TIMING, smooth)  # the other has learned that the torques are noisy
+    assert not any(estimate.in_contact for estimate in play(estimator, 2.0, 0.0, 0.0))
+    assert any(estimate.in_contact for estimate in play(estimator, 0.18, 0.0, 40.0))
+
+
 class Move(NamedTuple):
     """Smooth moves between random poses, with stops."""
 

@@ -117,6 +117,7 @@ class ContactEstimator:
         self._inference = ContactInference(arm, body, parameters.inference)
         self._fusion = ContactFusion(parameters.inference.fusion_time)
         self._in_contact = self._is_above = self._is_blind = False
+        self._ended = -math.inf  # by the age of the observer, s
         # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
         self._before: tuple[float, list[float], float] = 0.0, [], 0.0
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
@@ -136,6 +137,7 @@ class ContactEstimator:
         self._before = 0.0, [], 0.0
         self._fusion.reset()
         self._in_contact = self._is_above = False
+        self._ended = -math.inf
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -175,17 +177,21 @@ class ContactEstimator:
         sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
         if not observer.is_ready:
             self._in_contact = self._is_above = False
+            self._ended = -math.inf
             self._fusion.reset()
             reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
             return ContactEstimate(torques, sd, 0.0, reasons=reason)
         precision = inverse(covariance)
         statistic = detection_statistic(torques, precision)
         late = self._late(residual, precision, statistic)
-        fast = observer.fast_torques() if statistic <= parameters.detect else None
+        is_calm = self._in_contact or observer.age - self._ended > CONTACT.shaking_time
+        fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
             quick = detection_statistic(fast[0], inverse(fast[1]))
             statistic = max(statistic, quick / CONTACT.sudden)
-        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic)
+        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
+        if was_in_contact and not self._in_contact:
+            self._ended = observer.age
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
             if was_in_contact:
@@ -218,12 +224,12 @@ class ContactEstimator:
             self._pressed_at = []
         return self._in_contact or bool(self._pressed_at)
 
-    def _is_detected(self, statistic: float) -> bool:
+    def _is_detected(self, statistic: float, is_calm: bool) -> bool:
         detect, was_above = self._parameters.detect, self._is_above
-        self._is_above = statistic > detect
+        self._is_above = statistic > (detect if is_calm else CONTACT.shaken * detect)
         if self._in_contact:
             return statistic > self._parameters.release
-        return statistic > CONTACT.alone * detect or (self._is_above and was_above)
+        return (is_calm and statistic > CONTACT.alone * detect) or (self._is_above and was_above)
 
     @property
     def model_errors(self) -> dict[str, TrackedError]:

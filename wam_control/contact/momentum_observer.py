@@ -35,8 +35,8 @@ class MomentumObserver:
     r' = (tau_ext - r) / T.  Solved exactly over a period in which the torques are constant:
     r_k = a r_(k-1) + (1 - a) ((p_k - p_(k-1)) / dt - known torques), a = exp(-dt / T).
 
-    Motor side: q = M theta (A.5), its velocity less what the cables stretch; the momentum includes
-    rotors, reflected through (A.5), and pulleys; Coulomb friction has the sign of each motor's velocity, that of the
+    Motor side: cables assumed rigid, q = M theta (A.5); the momentum includes rotors, reflected
+    through (A.5), and pulleys; Coulomb friction has the sign of each motor's velocity, that of the
     joints the sign of the joint's.  Link side (joint sensors): links alone, tau is the strain torque,
     measured after the friction.  Motor torques are those that acted in the period that ends.
 
@@ -184,7 +184,7 @@ class MomentumObserver:
         present = np.array([*external, *model, *q, *qd, *qdd])
         self._filters.take(np.concatenate((present, signals)) if friction else present, span)
         self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias), 0.0
-        # releasing the brakes gives a jolt that the model does not predict;
+        # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
         settled = CONTACT.settled * self._parameters.time_constant

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import EQUAL, ShaftFriction
-from wam_control.contact.velocity_fit import FittedState, VelocityFit
+from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
 from wam_description.signals import State
@@ -34,9 +34,6 @@ class JointSample(NamedTuple):
 class MotorSide:
     """Rotors and cables between the motors and the joints.
 
-    A cable circuit stretches by its torque over its stiffness k (4.1), so q' = M (theta' - tau'/k).  The rotors are
-    light: the torque is that of the motor.  A shaft at rest carries a change of its torque by friction.
-
     Parameters
     ----------
     arm : the arm as modelled.
@@ -59,11 +56,12 @@ class MotorSide:
         self.is_identified = model is not None and model.is_identified
         self.friction = ShaftFriction(arm, parameters, model)
         self._velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
-        self._stiffness = [circuit.stiffness for circuit in arm.circuits]
         self._parameters, self._has_dither = parameters, has_dither
+        self._torque: Array | None = None
 
     def reset(self) -> None:
         """Forget all samples."""
+        self._torque = None
         self.friction.reset()
         self._velocity.reset()
 
@@ -84,16 +82,11 @@ class MotorSide:
     def take(self, state: State, dt: float) -> JointSample | None:
         """Take a state of the motors `dt` seconds after the one before; None while velocities are not known."""
         fitted = self._velocity.take(state, dt)
-        return None if fitted is None else self._sample(fitted)
+        return None if fitted is None else self._sample(fitted.state, fitted.dt)
 
-    def _sample(self, fitted: FittedState) -> JointSample:
-        (theta, thetad, tau_motor), rate, dt = fitted
-        rest = self._parameters.motor_rest_velocity
-        pulleys = [
-            speed - min(1.0, abs(speed) / rest) * change / stiffness
-            for speed, change, stiffness in zip(thetad, rate, self._stiffness, strict=True)
-        ]
-        q, qd = self.map.joint_positions(theta), self.map.joint_velocities(pulleys)
+    def _sample(self, state: State, dt: float) -> JointSample:
+        theta, thetad, tau_motor = state
+        q, qd = self.map.joint_positions(theta), self.map.joint_velocities(thetad)
         # with dither a shaft stops at both ends of each swing, held there by the external torque
         keep = 0.0 if self._has_dither else math.exp(-dt / self._parameters.friction_memory)
         motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)
@@ -102,7 +95,8 @@ class MotorSide:
         friction = [a + b for a, b in zip(through, at_shafts[n:], strict=True)]
         tau = self.map.joint_torques(tau_motor)
         transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*at_shafts[:n], *through], strict=True)]
-        sliding = motion.sliding.dot(EQUAL)
+        sliding, torque = motion.sliding.dot(EQUAL), np.array(tau_motor)
+        change = torque - (torque if self._torque is None else self._torque)
         signals = np.concatenate(
             (
                 motion.sliding.ravel(),
@@ -110,7 +104,8 @@ class MotorSide:
                 motion.resting,
                 motion.slow,
                 np.abs(transmitted) * sliding,
-                rate,
+                change / dt,
             )
         )
+        self._torque = torque
         return JointSample(q, qd, tau, friction, signals, dt)

@@ -9,6 +9,8 @@ class ContactThresholds:
 
     # detection
     sudden: float = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
+    shaking_time: float = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
+    shaken: float = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
     # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
     alone: float = 2.0
     smallest_statistic: float = 1e-12  # of the statistic of the torques, for a division

@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +13,9 @@ THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third diff
 
 
 class FittedState(NamedTuple):
-    """State in the middle of the window, the rate of its effort, N m/s, and how much older the state before is, s."""
+    """State in the middle of the window; the state before is `dt` seconds older."""
 
     state: State
-    rate: list[float]
     dt: float
 
 
@@ -58,19 +56,19 @@ class VelocityFit:
         self._follow(dt)
         half = CONTACT.half_windows[self._choice]
         if half == 0:
-            return FittedState(state, _rate(samples), dt)  # in one period the rotors take up what changes
+            return FittedState(state, dt)
         if len(samples) <= 2 * half:
             return None
         window = list(samples)[-2 * half - 1 :]
         times, angles = np.array([time for time, _ in window]), np.array([each.position for _, each in window])
-        middle, last = float(times.mean()), self._middle
-        if middle - last < 0.5 * dt:  # none since the window has grown
+        middle, before = float(times.mean()), self._middle
+        if middle - before < 0.5 * dt:  # none since the window has grown
             return None
         self._middle, self.delay = middle, self._time - middle
         times -= middle
         velocity = times @ (angles - angles[half]) / (times @ times)  # of a shaft at rest exactly zero
         fitted = State(angles.mean(axis=0).tolist(), velocity.tolist(), window[half][1].effort)
-        return FittedState(fitted, _rate(window), dt if math.isnan(last) else middle - last)
+        return FittedState(fitted, dt if math.isnan(before) else middle - before)
 
     def _follow(self, dt: float) -> None:
         """Follow the error of the angles, and take a longer window where it calls for one."""
@@ -104,12 +102,3 @@ class VelocityFit:
         # half a window and more: sum of the squared distances from the middle; none: a difference of two
         squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
         return THIRD / (math.sqrt(squares) * dt)
-
-
-def _rate(samples: Sequence[tuple[float, State]]) -> list[float]:
-    """Least-squares slope of the efforts of some samples, N m/s."""
-    times = np.array([time for time, _ in samples])
-    times -= times.mean()
-    squares = float(times @ times) or 1.0  # of one sample
-    rate: list[float] = (times @ np.array([each.effort for _, each in samples]) / squares).tolist()
-    return rate
