@@ -153,11 +153,6 @@ def _digits(values: Mapping[str, Any]) -> int:
     return 2 if value is None or allowed in (None, value) else digits_apart(value, allowed)
 
 
-def reasons_in_words(reasons: Reason) -> str:
-    """Why an estimate of a contact is not to be trusted, in words; '' where it is."""
-    return "; ".join(text for reason, text in REASONS.items() if reason in reasons)
-
-
 def sentences(events: Iterable[Event]) -> str:
     """Several events in words, each once."""
     return "; ".join(filter(None, dict.fromkeys(map(sentence, events))))

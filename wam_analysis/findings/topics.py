@@ -31,7 +31,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-        wrong += _unsmaller(name, columns, given)
+        wrong += _too_large(name, columns, given)
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
@@ -58,16 +58,18 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
 
 
-def _unsmaller(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
+def _too_large(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
     """Which values may be in another unit than that of ROS."""
     for quantity, most in UNUSUAL.items():
         values = np.abs(getattr(columns, quantity, np.empty(0)))
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
         if largest > most and quantity not in given.units:
             taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, if read in the unit of ROS"
-            smaller = {one: unit for unit, one in reversed(UNITS.items())
-                     if one[1] in QUANTITIES[quantity] and one[0] < 1.0}  # fmt: skip
-            units = " or ".join(f"--unit {quantity}={unit}" for unit in reversed(smaller.values()))
+            smaller: dict[tuple[float, str], str] = {}  # each in its first spelling
+            for unit, one in UNITS.items():
+                if one[0] < 1.0 and one[1] in QUANTITIES[quantity]:
+                    smaller.setdefault(one, unit)
+            units = " or ".join(f"--unit {quantity}={unit}" for unit in smaller.values())
             yield f"{name}: {taken}; if it is in another one, give {units}."
 
 

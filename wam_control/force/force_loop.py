@@ -319,8 +319,9 @@ class ForceLoop:
         moved = q - (q if run.before is None else run.before)
         run.before = q
         run.judge(self._q, self._measurement, forces)
+        knowledge = self._knowledge
         for one in run.axes:
-            one.known = self._knowledge.of(self._q, one.now, contact)
+            one.known = knowledge.of(self._q, one.now, contact)
         run.move(moved, forces, self._q)
         found: list[Event] = []
         if run.is_moving:

@@ -31,8 +31,7 @@ class Knowledge:
 
     def of(self, q: Sequence[float], axis: CommandedAxis, contact: Contact) -> Belief:
         """What is known of the force along an axis in a pose (n,), rad, with an estimated contact."""
-        known = self.whole(q, axis)
-        return self._among_links(q, axis, known, contact)
+        return self._among_links(q, axis, self.whole(q, axis), contact)
 
     def whole(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
         """What is known of a force, with the errors that the whole commanded force will have."""
