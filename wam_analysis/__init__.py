@@ -9,7 +9,6 @@ identification      from a recording of free motion to the controllers' model, b
 traces              forces and contacts of a run on one time base
 held_messages       for how long a recorded message is held, and the gaps of a topic
 holds               the constant forces that were commanded in a run, with names
-command_gaps        when a command was not recorded, so that it is not known
 contact_list        the contacts one by one, each estimated one compared with the true one
 unplanned_contact   contacts while no force is commanded that are harder than allowed
 task_forces         constant forces that were commanded, those of tasks, and what was measured of each

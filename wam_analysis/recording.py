@@ -4,7 +4,6 @@ from functools import cached_property
 
 import numpy as np
 
-from wam_analysis.command_gaps import CommandGap, command_gaps
 from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contacts, true_contacts
 from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theory_of
 from wam_analysis.findings.transmission import TransmissionFriction, transmission_friction
@@ -154,16 +153,10 @@ class AnalysedRecording:
         is_timed = any(RATE in facts for facts in self.loop)
         return "realtime" if self.run.mode == "unknown" and is_timed else self.run.mode
 
-    @cached_property
-    def gaps(self) -> tuple[CommandGap, ...]:
-        """Gaps of commands."""
-        return command_gaps(self.run, self.traces.stamp, self.steps)
-
     @property
-    def lost(self) -> tuple[str, ...]:
+    def lost(self) -> list[str]:
         """Sentences about what the bag lacks, none if no loss is known."""
-        gaps = (gap.sentence(self.traces.zero) for gap in self.gaps)
-        return (*self.bag.losses.sentences(self.bag.first), *gaps)
+        return self.bag.losses.sentences(self.bag.first)
 
     # forces
 
@@ -261,7 +254,7 @@ class AnalysedRecording:
     @cached_property
     def unplanned(self) -> UnplannedContacts:
         """Contacts without a command of a force, harder than allowed."""
-        return unplanned_contacts(self.run, self.traces, self.steps, self.gaps)
+        return unplanned_contacts(self.run, self.traces, self.steps)
 
     # the transmission
 

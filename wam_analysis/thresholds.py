@@ -216,7 +216,6 @@ class StreamThresholds:
     fewest: int = 10  # messages of which the period of a topic is known
     filled: float = 5.5  # periods of the longest gap that is filled by interpolation
     shown: int = 3  # messages of a topic that is shown
-    transformed: int = 64  # messages of a topic whose spectrum is shown
     pace: float = 0.2  # by which the median period of the receptions may differ from that of the stamps
     # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
     reset: int = 1_000_000_000
@@ -267,9 +266,7 @@ class ReportLayout:
     points: int = 6000  # points of a line
     digits: int = 6  # of a number
     arm: tuple[float, float] = (5.6, 4.2)  # inches, of the picture of the arm
-    dots: int = 1500  # of a picture of dots
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
-    amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
     still: float = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
     flat: float = 1e-4  # of the value; a smaller range of a plot is not blown up
     pedestal: float = 0.07  # m, radius of the drawn base, which is not in the parameters

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.command_gaps import COMMANDS, CommandGap
 from wam_analysis.held_messages import held_rows
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import NAN, Traces
@@ -16,6 +15,7 @@ from wam_control.task.scenario import FORCE_LOOP
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 LIMIT = "limits.contact_force"
+COMMANDS = ("force_command", "task_command", "sim/disturbance")  # the last is of a simulated arm
 
 
 class HardContact(NamedTuple):
@@ -64,16 +64,14 @@ class UnplannedContacts(NamedTuple):
         return (*(one.sentence for one in self.hard), *[unknown][: bool(self.unknown)])
 
 
-def unplanned_contacts(
-    run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep], gaps: Sequence[CommandGap]
-) -> UnplannedContacts:
+def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> UnplannedContacts:
     """Those of all the time that was recorded; with the true force where it is known in a step, else the estimated.
 
-    Within gaps of a command it is not known what was planned.
+    Where no command comes, nothing is commanded; where the bag lacks messages of one, it is not known what was planned.
     """
     found: list[HardContact] = []
     unknown: list[str] = []
-    is_planned, allowed, unrecorded = _planned(run, traces), _allowed(run, traces), _unrecorded(run, traces, gaps)
+    is_planned, allowed, lacking = _planned(run, traces), _allowed(run, traces), ", ".join(_lacking(run))
     for name, begin, end in _parts(traces, steps):
         rows = begin + np.flatnonzero(~is_planned[begin:end])
         source, signal = "true", traces.true
@@ -83,25 +81,26 @@ def unplanned_contacts(
         if np.any(np.isnan(allowed[rows])):
             unknown.append(f"{LIMIT} of the force loop was not recorded, or cannot be read")
         rows = rows[signal.size[rows] > allowed[rows]]
-        doubtful = np.any([lacks[rows] for lacks in unrecorded.values()], axis=0)
-        if len(known := rows[~doubtful]):
-            row = known[np.argmax(signal.size[known])]
-            seconds = (int(traces.stamp[row]) - traces.zero) / 1e9
-            found.append(HardContact(name, seconds, float(signal.size[row]), float(allowed[row]), source))
-        if len(rows := rows[doubtful]):
-            lacking = ", ".join(topic for topic, lacks in unrecorded.items() if np.any(lacks[rows]))
-            unknown.append(f"one had {np.max(signal.size[rows]):.3g} N, and what may have been commanded then was not "
-                           f"recorded ({lacking})")  # fmt: skip
+        if not len(rows):
+            continue
+        row = rows[np.argmax(signal.size[rows])]
+        hard = HardContact(
+            name, (int(traces.stamp[row]) - traces.zero) / 1e9, float(signal.size[row]), float(allowed[row]), source
+        )
+        if lacking:
+            unknown.append(
+                f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded ({lacking})"
+            )
+        else:
+            found.append(hard)
     return UnplannedContacts(tuple(found), "; ".join(dict.fromkeys(unknown)))
 
 
-def _unrecorded(run: RecordedRun, traces: Traces, gaps: Sequence[CommandGap]) -> dict[str, Mask]:
-    """When each command was not recorded, (k,), by topic; an arm that is not simulated has no disturbance."""
-    topics = COMMANDS if run.is_simulated else COMMANDS[:2]
-    found = {one: np.full(len(traces.stamp), f"{run.namespace}/{one}" not in run.bag.topics) for one in topics}
-    for gap in gaps:
-        found[gap.topic] |= gap.covers(traces.stamp, TOUCH.after_command)
-    return found
+def _lacking(run: RecordedRun) -> list[str]:
+    """Commands that were not recorded, or not all of their messages."""
+    lost = run.bag.losses.topics
+    named = {one: f"{run.namespace}/{one}" for one in (COMMANDS if run.is_simulated else COMMANDS[:2])}
+    return [one for one, name in named.items() if name not in run.bag.topics or name in lost]
 
 
 def _parts(traces: Traces, steps: Sequence[RecordedStep]) -> list[tuple[str, int, int]]:

@@ -67,7 +67,6 @@ class Losses(NamedTuple):
     at_end : messages that were announced and did not come before the recorder ended, by 'topic from publisher'.
     unfinished : nodes that gave no final count, so that it is not known what is lost of them at the end.
     uncounted : whether the recorder of this project ended without writing its counts.
-    complete : topics of which every message that was sent is in the bag up to its end, by the recorder's counts.
     """
 
     repaired: dict[str, FileLosses | None]
@@ -76,7 +75,11 @@ class Losses(NamedTuple):
     uncounted: bool
     at_end: Mapping[str, int] = MappingProxyType({})
     unfinished: str = ""
-    complete: frozenset[str] = frozenset()
+
+    @property
+    def topics(self) -> set[str]:
+        """Those of which messages are known to be lost."""
+        return {key.partition(" ")[0] for key in (*self.by_topic, *self.dropped, *self.at_end)}
 
     @property
     def by_topic(self) -> dict[str, int]:
@@ -141,7 +144,6 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
     if is_part:
         received = Counter()
     missing = {topic: count - counts.get(topic, 0) for topic, count in sorted(received.items())}
-    lost_on_the_way = {where.split(" ")[0] for where in lost[DROPPED]}
     return Losses(
         repaired,
         {topic: count for topic, count in missing.items() if count > 0},
@@ -149,7 +151,6 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
         bool(counts) and PARAMETERS in attachments and not recording,
         lost[LOST_AT_END],
         recording.get(UNFINISHED, ""),
-        frozenset(topic for topic, count in missing.items() if count <= 0 and topic not in lost_on_the_way),
     )
 
 

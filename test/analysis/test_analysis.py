@@ -155,9 +155,7 @@ def test_what_was_changed_while_the_arm_ran_is_named(moving: Recorded) -> None:
     gain = moving.configuration.sections["force_loop"]["force_gain"]
     assert f"Changed while it ran: force_loop:force_gain from {gain} to [0.001] at 2.9" in text
     assert text.count("Changed") == 1
-    stability = section_of(moving, "stability")
-    assert stability.sentences[0].startswith("Changed while it ran")
-    assert all("parameters at the start" in one.note for one in stability.findings if math.isfinite(one.predicted))
+    assert "Predictions and domains of gains are for the values at the start." in text
 
 
 def test_a_push_is_in_no_friction_where_only_gravity_is_known(moving: Recorded) -> None:
@@ -557,7 +555,5 @@ def test_every_joint_and_the_force_have_a_chart_of_their_own(planted: Analysis) 
     assert [chart.title for chart in drawn[:3]] == [
         "elbow over time.", "wrist over time.", "/r/wrench over time.",
     ]  # fmt: skip
-    spectrum, _ = [chart for chart in drawn if chart.section == "stability"]
-    assert [chart.section for chart in drawn[:3]] == ["happened", "happened", "signals"]
-    assert spectrum.x[int(np.argmax(spectrum.series[0].values))] == pytest.approx(3.1, abs=0.13)
-    assert max(spectrum.series[0].values) == pytest.approx(0.3, rel=0.1)
+    assert [chart.section for chart in drawn] == ["happened", "happened", "signals"]
+    assert max(drawn[0].series[0].values) == pytest.approx(0.3, rel=0.01)

@@ -361,6 +361,7 @@ def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
     sent += wrenches("/wrench", time, np.full((len(time), 3), math.nan))
     analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
     assert numbers["/joint_states: missed periods"] == 0.0
+    assert "a over time." in page(analysis)
     happened = " ".join(line for section in analysis.sections[:2] for line in section.sentences)
     assert "/joint_states: b without a value that is a number." in happened
     assert f"/wrench: {len(time)} forces, none of which is a number." in happened
@@ -554,7 +555,8 @@ def test_a_topic_that_is_named_as_one_of_ours_makes_no_recording_of_ours(small: 
 
 def test_only_what_is_named_is_analysed(small: Path) -> None:
     given = topic_map(["/ur/joint_states"], ["elbow_joint"], [], [], [])
-    _, numbers = found((small, given))
+    analysis, numbers = found((small, given))
+    assert "elbow_joint over time." in page(analysis)
     assert {name.partition(":")[0] for name in numbers} == {"elbow_joint", "/ur/joint_states"}
     with pytest.raises(ValueError, match=r"no topic /nothing; its topics: /ft/wrench, /ur/joint_states"):
         found((small, TopicMap(topics=("/nothing",))))

@@ -1,6 +1,5 @@
 """The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,7 +27,6 @@ from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
 from wam_sim.recorded_run import RecordedRun
 
-OF_THE_START = "predicted for the parameters at the start; they were changed later"
 Progress = Callable[[str], None]
 Maker = Callable[[AnalysedRecording], Section | None]
 
@@ -162,12 +160,11 @@ def analyse_bag(
     sections : which are made; all if empty.
     """
     recording = AnalysedRecording(bag, namespace, given)
-    changed = [*_changed(recording.run, recording.traces.zero)]
     made = []
     for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
         if (section := make(recording)) is not None:
             progress(section.title)
-            made.append(_marked(section, changed) if changed and section.by_gains else section)
+            made.append(section)
     return Analysis(recording, (_verdict(recording, made), *made))
 
 
@@ -243,15 +240,6 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
             f"Changed while it ran: {', '.join(named[: LAYOUT.changes])}{more}. "
             "Predictions and domains of gains are for the values at the start."
         )
-
-
-def _marked(section: Section, changed: Sequence[str]) -> Section:
-    """A section whose predictions are for the parameters at the start, where these were changed."""
-    findings = [
-        one._replace(note="; ".join(filter(None, (one.note, OF_THE_START)))) if math.isfinite(one.predicted) else one
-        for one in section.findings
-    ]
-    return section._replace(sentences=(*changed, *section.sentences), findings=findings)
 
 
 SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, force_section, contact_section)

@@ -5,18 +5,16 @@
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const drawn = [];
-  const decade = (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? value.toExponential(0) : "");
   function short(value, step, largest) {
     if (largest < 1e-3) return value ? value.toExponential(1) : "0";
     let digits = 0;  // 2.5 has one more than 2
     while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
     return value.toFixed(digits);
   }
-  function axis(label, size, logarithmic) {
-    const text = logarithmic ? decade : short;
+  function axis(label, size) {
     const labels = (plot, values, index, space, step) => {
       const largest = Math.max(...values.map(Math.abs));  // null counts as 0
-      return values.map((value) => (value === null ? "" : text(value, step, largest)));
+      return values.map((value) => (value === null ? "" : short(value, step, largest)));
     };
     return { values: labels, label, size, stroke: style("--ink"), grid: { stroke: style("--line"), width: 1 }, ticks: { stroke: style("--line") } };
   }
@@ -31,14 +29,13 @@
       label: one.label, width: 1.5, spanGaps: false,
       stroke: one.colour === "ink" ? style("--ink") : one.colour,
       dash: one.dashed ? [6, 4] : undefined,
-      points: { show: one.dots, size: 3 },
-      paths: one.dots ? () => null : undefined,
+      points: { show: false },
     }));
     const options = {
       width: place.clientWidth, height: chart.height,
       series: [{ label: chart.across }, ...series],
-      axes: [axis(chart.across, 46, chart.logarithmic), axis(chart.up, 70, chart.logarithmic)],
-      scales: chart.logarithmic ? { x: { time: false, distr: 3 }, y: { distr: 3 } } : { x: { time: false }, y: { range } },
+      axes: [axis(chart.across, 46), axis(chart.up, 70)],
+      scales: { x: { time: false }, y: { range } },
       cursor: chart.key ? { sync: { key: chart.key } } : {},
     };
     return new uPlot(options, [chart.x, ...chart.series.map((one) => one.y)], place);

@@ -10,8 +10,7 @@ import numpy as np
 from wam_analysis.drawing import COLOURS, COMMANDED, LIKELY, SHAFTS
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.repetition import held as held_command
-from wam_analysis.foreign.sources import Source, longest, pieces
-from wam_analysis.measures.lines import amplitudes
+from wam_analysis.foreign.sources import Source
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, STREAM
 from wam_bag.arrays import Numbers
@@ -21,13 +20,12 @@ TIME, FORCE, FIRST, SIGNALS = "time [s]", "force [N]", "happened", "signals"
 
 
 class ChartLine(NamedTuple):
-    """A line, or dots: its label, colour and values, (n,)."""
+    """A line: its label, colour and values, (n,)."""
 
     label: str
     colour: str
     values: Numbers
     dashed: bool = False
-    dots: bool = False
 
 
 class Chart(NamedTuple):
@@ -41,7 +39,6 @@ class Chart(NamedTuple):
     x : (n,), rising.
     series : one line each.
     key : charts with the same one share the cursor; '' for none.
-    logarithmic : whether both axes are.
     """
 
     section: str
@@ -51,7 +48,6 @@ class Chart(NamedTuple):
     x: Numbers
     series: tuple[ChartLine, ...]
     key: str = ""
-    logarithmic: bool = False
 
 
 def charts(analysis: Analysis) -> Iterator[Chart]:
@@ -60,8 +56,6 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
     for i, chart in enumerate(over_time):
         yield chart._replace(section=FIRST if i < LAYOUT.first_charts else SIGNALS)
     yield from map(_thinned, _positions(analysis))
-    for one in _shown(analysis.recording):
-        yield from _of_motion(one)
 
 
 def _over_time(analysis: Analysis) -> Iterator[Chart]:
@@ -73,6 +67,8 @@ def _over_time(analysis: Analysis) -> Iterator[Chart]:
         yield _thinned(Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time"))
     for one in _shown(recording):
         quantities = [q for q in one.values if not q.startswith("torque")][: 1 if one.is_joint else 3]
+        if not quantities:
+            continue  # none was a number
         command = recording.command_of(one)
         lines = [ChartLine(q, SHAFTS[i % len(SHAFTS)], one.values[q]) for i, q in enumerate(quantities)]
         if command is not None:
@@ -120,25 +116,6 @@ def _positions(analysis: Analysis) -> Iterator[Chart]:
         yield Chart("contact", "Position of the contact along the link.", TIME, "position [cm]", time, tuple(lines))
 
 
-def _of_motion(one: Source) -> Iterator[Chart]:
-    """Spectrum of the longest stretch, and velocity over position: a cycle is a closed curve."""
-    piece = longest(pieces(one, "position"))
-    if piece is None:
-        return
-    value, unit = piece.values["position"], one.units["position"]
-    frequency, amplitude = (each[1:] for each in amplitudes(piece.time, value))
-    if len(value) >= STREAM.transformed:
-        line = ChartLine(one.label, SHAFTS[0], np.maximum(amplitude, LAYOUT.amplitude))
-        title = f"Spectrum of {one.label}: amplitude of each frequency."
-        up = f"amplitude [{unit}]"
-        yield Chart("stability", title, "frequency [Hz]", up, frequency, (line,), logarithmic=True)
-    rows = np.unique(np.linspace(0, len(value) - 1, LAYOUT.dots).astype(np.int64))
-    rows = rows[np.argsort(value[rows], kind="stable")]
-    line = ChartLine(one.label, SHAFTS[0], piece.values["velocity"][rows], dots=True)
-    title = f"Velocity over position of {one.label}; a cycle is a closed curve."
-    yield Chart("stick_slip", title, f"position [{unit}]", f"velocity [{unit}/s]", value[rows], (line,))
-
-
 def _thinned(chart: Chart) -> Chart:
     """The chart with at most `points` points, which looks the same."""
     if len(chart.x) <= LAYOUT.points:
@@ -175,14 +152,13 @@ def data(found: list[Chart]) -> str:
 
 def _plain(chart: Chart) -> dict[str, Any]:
     return {
-        **{name: getattr(chart, name) for name in ("across", "up", "key", "logarithmic")},
+        **{name: getattr(chart, name) for name in ("across", "up", "key")},
         "height": 240,
         "x": _numbers(chart.x),
         "series": [
             {
                 "label": one.label,
                 "dashed": one.dashed,
-                "dots": one.dots,
                 "colour": "ink" if one.colour == COMMANDED else one.colour,  # readable on light and dark
                 "y": _numbers(one.values),
             }

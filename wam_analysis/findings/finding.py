@@ -62,7 +62,6 @@ class Section(NamedTuple):
     lacking : topics that are not in the bag and would add to the section.
     shows, wrong : what of it belongs to the verdict, the most important first: what the recording shows, and what is
         wrong with it.
-    by_gains : whether its predictions are by live parameters as they were at the start.
     """
 
     key: str
@@ -72,7 +71,6 @@ class Section(NamedTuple):
     lacking: Sequence[str] = ()
     shows: Sequence[str] = ()
     wrong: Sequence[str] = ()
-    by_gains: bool = False
 
 
 def deviations(findings: Sequence[Finding]) -> tuple[str, ...]:

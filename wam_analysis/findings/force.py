@@ -42,7 +42,7 @@ def force_section(recording: AnalysedRecording) -> Section:
     sentences += [WHOSE] * any(not one.hold.is_refused for one in held)
     findings += _dynamic_range(recording)
     wrong = _reaction_verdict(reactions, zero)
-    return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong, by_gains=True)
+    return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong)
 
 
 def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -201,7 +201,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     margin = f", by the guard up to {shown(min(margins))} times the gains are stable" if margins else ""
     if settled and not verdict and not wrong:
         verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
-    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong, by_gains=True)
+    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong)
 
 
 def _fate(one: HeldForce) -> tuple[str, Verdict]:

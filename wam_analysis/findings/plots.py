@@ -23,7 +23,7 @@ def arm_plot(recording: AnalysedRecording) -> tuple[str, bytes] | None:
     """Caption and SVG of the arm in the pose of `_moment`; None without a pose."""
     recorded, traces = recorded_arm(recording.parameters), recording.traces
     arm = recorded.arm
-    poses = joint_angles(recording.run, arm)
+    poses = None if recording.is_foreign else joint_angles(recording.run, arm)
     if poses is None or not len(traces.stamp):
         return None
     stamp = _moment(recording)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, counted, shown, times
+from wam_analysis.findings.finding import Section, counted, shown, times
 from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
@@ -40,7 +40,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     sentences += [*wrong, *_alike(found), *_unread(bag)]
     if not found:
         wrong += _unread(bag) or ["nothing in it can be analysed."]
-    return Section("happened", "What happened", sentences, _treated_findings(found), wrong=wrong)
+    return Section("happened", "What happened", sentences, wrong=wrong)
 
 
 def _topic(name: str, columns: Columns) -> Iterator[str]:
@@ -124,14 +124,6 @@ def _treated(found: Sequence[Source]) -> list[str]:
         )
         sentences.append(f"{subject}: {words}.")
     return sentences
-
-
-def _treated_findings(found: Sequence[Source]) -> list[Finding]:
-    return [
-        Finding(f"{one.label}: {' '.join(filter(None, (treated.what, treated.quantity)))}", "", float(treated.number))
-        for one in found
-        for treated in one.treated
-    ]
 
 
 def _alike(found: Sequence[Source]) -> list[str]:
