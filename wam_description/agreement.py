@@ -1,16 +1,12 @@
 """Whether nodes that were started apart work with the same shared parameters, by what their statuses have of them."""
 
 import base64
-import json
 import zlib
-from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, fields, listed, values
+from wam_description.parameters import fields, listed, values
 from wam_description.thresholds import FILES
-
-T = TypeVar("T")
 
 DIGESTS = "shared parameters"  # fact in the status of a node: `digests` of what it was started with
 OF_ONE_PROCESS = frozenset(
@@ -23,7 +19,7 @@ _LENGTH = 3  # characters of 6 bits each: two values have the same digest in one
 def digests(shared: Shared) -> str:
     """A digest of the names of the compared parameters, then one of the value of each; of three characters.
 
-    Compared are those that cannot change while a node runs, apart from those of one process.
+    All are compared but those of one process.
     """
     present, names = values(shared), _compared()
     return "".join([_digest(names), *(_digest(listed(present[name])) for name in names)])
@@ -59,29 +55,8 @@ def difference(one: str, other: str) -> str:
     return f"{', '.join(different[: FILES.disagreements])}{more}"
 
 
-def live_facts(group: Any, prefix: str) -> dict[str, str]:
-    """Present values of live shared parameters, which are numbers, as facts of a status, by their full names."""
-    return {f"{prefix}{name}": str(listed(value)) for name, value in values(group).items()}
-
-
-def with_facts(group: T, prefix: str, facts: Mapping[str, str]) -> T:
-    """A group of live shared parameters with the values that the facts of a status have of it.
-
-    Raises
-    ------
-    ParameterError
-        for a value that is none of such a parameter.
-    """
-    present = values(group)
-    try:
-        given = {name: json.loads(facts[prefix + name]) for name in present if prefix + name in facts}
-    except (ValueError, RecursionError) as error:
-        raise ParameterError(f"{type(error).__name__}: {error}") from None
-    return build(type(group), {**present, **given})
-
-
 def _compared() -> list[str]:
-    return [field.name for field in fields(Shared) if not field.live and field.name not in OF_ONE_PROCESS]
+    return [field.name for field in fields(Shared) if field.name not in OF_ONE_PROCESS]
 
 
 def _digest(value: Any) -> str:

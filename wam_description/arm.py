@@ -297,8 +297,8 @@ class Timing:
 class Servo:
     """Gains of the velocity loop of each motor; the velocity loop uses them, the stability guard relies on them."""
 
-    proportional_gain: tuple[float, ...] = parameter("motor torque per velocity error", "N m s/rad", live=True)
-    integral_gain: tuple[float, ...] = parameter("motor torque per angle error", "N m/rad", live=True)
+    proportional_gain: tuple[float, ...] = parameter("motor torque per velocity error", "N m s/rad")
+    integral_gain: tuple[float, ...] = parameter("motor torque per angle error", "N m/rad")
 
 
 def seconds(nanoseconds: int) -> float:

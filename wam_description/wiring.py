@@ -18,8 +18,6 @@ in one process (`wam_sim.simulation`) and the replay of a recording (`wam_sim.re
 parameters in that section, or 'module:Class' where its import takes long.  What else a node may have:
 
 tune(own) : take new live parameters, or refuse them with ParameterError.
-owns : name of a group of shared parameters that are live at this node, taken by ``retune(group)``.
-follows : a `Followed` group of parameters of another node; its values there go to ``retune(group)``, or the arm brakes.
 take_status(status) : called with the `NodeStatus` that any other node reports; it may return outputs.
 services : names of methods, each of which answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
 requests : list of `Call` and `SetParameters`, filled by steps; made in order before the step's outputs are published.
@@ -118,13 +116,6 @@ class SetParameters(NamedTuple):
     values: Mapping[str, Any]
 
 
-class Followed(NamedTuple):
-    """A group of shared parameters that is live at another node."""
-
-    node: str
-    group: str
-
-
 class Declared(Protocol):
     """A node class as this module describes it."""
 
@@ -155,12 +146,6 @@ class Declaration(NamedTuple):
     listens: tuple[str, ...]
     topics: tuple[Topic, ...]
     ros_node: str
-
-    @property
-    def shared_group(self) -> str:
-        """The group of shared parameters that the node takes while it runs, '' where there is none."""
-        followed: Followed | None = getattr(self.node, "follows", None)
-        return getattr(self.node, "owns", None) or (followed.group if followed else "")
 
     @property
     def parameter_class(self) -> Any:

@@ -18,7 +18,7 @@ from wam_driver.realtime import Realtime
 from wam_driver.thresholds import DRIVER
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.ros_parameters import follow_together
+from wam_ros.ros_parameters import follow
 
 
 class DriverNode(ArmDriver):
@@ -30,7 +30,7 @@ class DriverNode(ArmDriver):
         timing, interface = shared.timing, self.interface
         self.driver = Driver(shared, own)
         self.safety = self.driver.safety
-        follow_together(self, [(own, lambda new: self.driver.set_effects(new.effects), "")])
+        follow(self, own, lambda new: self.driver.set_effects(new.effects))
         self._directory = own.post_mortem_directory
         self._started = timing.mode == "realtime"
         self.inlets.feed("sim/disturbance", self._take_push)

@@ -86,8 +86,7 @@ class StackNode(TolerantNode):
         super().__init__(declaration.name, **ros)
         require_name(self, declaration.name)
         self._place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
-        owned: str | None = getattr(declaration.node, "owns", None)
-        self.shared, self.own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
+        self.shared, self.own = declare(self, declaration.parameter_class)
         self.interface = Interface(self.shared, started_by_hand=declaration)
         topics = self.interface.topics
         rows = [topics[topic] for topic in declaration.outputs if topic in topics]

@@ -69,7 +69,6 @@ class Health:
     plain : of the node's work alone, as it was published last.
     counts : steps and whatever else the node counts, for the diagnostics.
     facts : further values for the diagnostics.
-    live : present values of the shared parameters that the node owns, as facts of its status.
     problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
     refusals : by topic.
     session : of the driver that this node follows, 0 before it is known.
@@ -81,7 +80,6 @@ class Health:
         self.status = self.plain = WAITING
         self.counts: Counter[str] = Counter()
         self.digests = digests(shared)
-        self.live: dict[str, str] = {}
         self.problems: dict[str, Event] = {}
         self.refusals = defaultdict[str, Refusal](Refusal)
         self.session = 0
@@ -114,7 +112,7 @@ class Health:
 
     def _whole(self, status: NodeStatus) -> NodeStatus:
         """A status with what the other nodes compare, and take, of the shared parameters."""
-        facts = {**status.facts, DIGESTS: self.digests, **self.live}
+        facts = {**status.facts, DIGESTS: self.digests}
         return status._replace(node=self._node.get_name(), connected=self.is_ready, facts=facts)
 
     def _send(self, status: NodeStatus) -> None:
@@ -157,12 +155,10 @@ class Health:
 
         What was taken after one step is reported together, so that only the last message is needed.
         """
-        texts = {name: str(listed(value)) for name, value in values.items()}
         after, before = self._changes
         facts = before if stamp == after else {CHANGES: "yes"}
-        facts |= {f"{self._node.get_name()}:{name}": text for name, text in texts.items()}
+        facts |= {f"{self._node.get_name()}:{name}": str(listed(value)) for name, value in values.items()}
         self._changes = stamp, facts
-        self.live |= {name: text for name, text in texts.items() if name in self.live}
         self.status = self._whole(self.status)
         self._send(self._with(self.status, facts)._replace(stamp=stamp))
 

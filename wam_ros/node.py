@@ -4,7 +4,7 @@ import importlib
 import re
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import pairwise, takewhile
@@ -17,7 +17,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
 from wam_description.event import Event, Level, fault
 from wam_description.event_text import sentence
@@ -27,13 +26,13 @@ from wam_description.signals import NodeStatus
 from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
-from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
+from wam_description.wiring import Declaration, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
-from wam_ros.health import WAITING, problem_of
+from wam_ros.health import WAITING
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.requests import Request, RequestQueue
-from wam_ros.ros_parameters import Follower, follow_together
+from wam_ros.ros_parameters import follow
 from wam_ros.ros_topics import SECOND
 from wam_ros.run import run
 
@@ -61,7 +60,8 @@ class AdaptedNode(StackNode):
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
         self._since, self._is_enabled = 0, False
         self._requests = RequestQueue(self, self._take_refusal)
-        self._follower = self._follow_parameters()
+        if tune := getattr(node, "tune", None):
+            follow(self, self.own, tune, lambda values: self.health.report_change(self._worked, values))
         self._synchronisers: set[Synchroniser] = set()
         for topic, feeds in self.interface.feeds(declaration, node).items():
             self._connect(topic, feeds)
@@ -69,27 +69,6 @@ class AdaptedNode(StackNode):
             STEPS.watch(declaration.name, self.health.report_long_step)
         for name in getattr(node, "services", ()):
             self.create_service(Trigger, f"~/{name}", _answering(getattr(node, name)))
-
-    def _follow_parameters(self) -> Follower | None:
-        """Take live parameters, and those of another node that this one follows."""
-        node, health, shared = self.node, self.health, self.shared
-        live = [(self.own, tune, "")] if (tune := getattr(node, "tune", None)) else []
-        if owned := getattr(node, "owns", None):
-            health.live = live_facts(getattr(shared, owned), f"{owned}.")
-            live.append((getattr(shared, owned), node.retune, f"{owned}."))
-        follow_together(self, live, self._report_live)
-        followed: Followed | None = getattr(node, "follows", None)
-        if followed is None:
-            return None
-        group = followed.group
-        return Follower(
-            followed.node,
-            group,
-            getattr(shared, group),
-            node.retune,
-            lambda reason: health.set_problem(f"parameters {group}", problem_of("parameters", reason)),
-            self._report_change,
-        )
 
     @property
     def done(self) -> bool:
@@ -105,11 +84,6 @@ class AdaptedNode(StackNode):
     def failure(self) -> str:
         """Why the node failed, '' where it did not."""
         return getattr(self.node, "failure", "")
-
-    def is_waiting(self) -> bool:
-        """Whether the node still lacks the values of the node that it follows."""
-        follower = self._follower
-        return follower is not None and follower.other in self.interface.declarations and not follower.has_heard
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""
@@ -226,7 +200,7 @@ class AdaptedNode(StackNode):
 
     def take_status(self, status: NodeStatus) -> None:
         """Follow the driver: forget what came before its session, and commands from before the brakes were switched."""
-        if status.node not in self.peers.names and (self._follower is None or status.node != self._follower.other):
+        if status.node not in self.peers.names:
             return
         if status.node == "driver":
             self._is_enabled = status.mode == "enabled"
@@ -241,22 +215,11 @@ class AdaptedNode(StackNode):
                 self._since = status.since
                 for synchroniser in self._synchronisers:
                     synchroniser.discard_commands(status.since)
-        if self._follower is not None:
-            self._follower.hear(status)
         take_status = getattr(self.node, "take_status", None)
         if take_status and (outputs := take_status(status)):
             self._publish(status.stamp, outputs)
             if getattr(self.node, "done", False):  # nobody may be there to answer its requests
                 self._requests.clear()
-
-    def _report_change(self, values: Mapping[str, Any]) -> None:
-        self.health.report_change(self._worked, values)
-
-    def _report_live(self, values: Mapping[str, Any]) -> None:
-        """Report live parameters that were set here; with them the node may accept what it follows."""
-        self._report_change(values)
-        if self._follower is not None:
-            self._follower.settle()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """As that of rclpy; the reason of a success states what applies where the node has lowered something."""

@@ -109,16 +109,8 @@ class RecordedParameters(NamedTuple):
 
     @property
     def shared(self) -> Shared:
-        """What every node reads; a group that is live at one of them, as that one had it."""
-        first = next((node for node in NODES if node in self.nodes), "driver")
-        settings = {
-            f"{first}:{name}": value
-            for node in self.nodes
-            if node in NODES and (group := getattr(declared(node).node, "owns", ""))
-            for name, value in self.nodes[node].items()
-            if name.startswith(f"{group}.")
-        }
-        return self.with_values(settings).part(first, Shared)
+        """What every node reads."""
+        return self.part(next((node for node in NODES if node in self.nodes), "driver"), Shared)
 
 
 def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:

@@ -69,10 +69,9 @@ class Compared(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Parameters that a node takes after its step of a stamp, ns, and by which of its methods."""
+    """Parameters that a node takes after its step of a stamp, ns."""
 
     after: int
-    method: str
     parameters: Any
 
 
@@ -153,7 +152,7 @@ def replay(
     present = (
         configuration.sections.get(declaration.name, {}) if configuration else run.parameters.nodes[declaration.name]
     )
-    changes = _changes(run, shared, declaration, present)
+    changes = _changes(run, declaration, present)
     published = _run(bag, namespace, shared, declaration, own, changes)
     compared = []
     for topic in map(rows.__getitem__, outputs):
@@ -209,21 +208,17 @@ def _changed_values(run: RecordedRun, declaration: Declaration, shared: Shared, 
     )
 
 
-def _changes(run: RecordedRun, shared: Shared, declaration: Declaration, values: Mapping[str, Any]) -> list[Change]:
+def _changes(run: RecordedRun, declaration: Declaration, values: Mapping[str, Any]) -> list[Change]:
     """What the node took while it ran, as it reported it or as a scenario set it."""
     prefix, present, found = f"{declaration.name}:", dict(values), list[Change]()
     reported = run.changes(declaration.name)
     steps = () if reported else (*run.steps, *([run.unfinished] if run.unfinished else []))
     given = [(one.after, one.settings) for one in reported] + [(step.begin - 1, step.settings) for step in steps]
-    group = declaration.shared_group
     for after, settings in given:
         mine = {key.removeprefix(prefix): value for key, value in settings.items() if key.startswith(prefix)}
         present |= mine
-        of_group = {name for name in mine if group and name.startswith(f"{group}.")}
-        if mine.keys() - of_group:
-            found.append(Change(after, "tune", build_part(declaration.parameter_class, present)))
-        if of_group:
-            found.append(Change(after, "retune", build_part(type(getattr(shared, group)), present, f"{group}.")))
+        if mine:
+            found.append(Change(after, build_part(declaration.parameter_class, present)))
     return found
 
 
@@ -243,8 +238,7 @@ def _run(
     def changing(work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
         def step(inputs: Inputs) -> Outputs:
             while changes and changes[0].after < inputs.stamp:
-                change = changes.pop(0)
-                getattr(node, change.method)(change.parameters)
+                node.tune(changes.pop(0).parameters)
             return work(inputs)
 
         return step

@@ -204,33 +204,23 @@ def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() 
 
 
 @pytest.mark.slow
-def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:
+def test_the_guard_relies_on_the_gains_of_the_velocity_loop() -> None:
     own = replace(OWN, force_gain=(0.09,))
-    loop = Loop(own)
-    before, report = loop.assessment, loop.report
-    assert before is not None
     with pytest.raises(ParameterError, match="times the largest linearly stable one"):
         ForceLoop(ARM, STIFF, own, CLOCK)
-    with pytest.raises(ParameterError, match="times the largest linearly stable one"):
-        loop.retune_servo(STIFF)
-    assert (loop.assessment, loop.report, loop.parameters) == (before, report, own), "nothing has changed"
-    loop.tune(own)
-    assert loop.assessment == before, "and the old gains are still the ones relied on"
     slightly = Servo(tuple(0.9 * gain for gain in SERVO.proportional_gain), SERVO.integral_gain)
-    loop.retune_servo(slightly)
-    assert loop.assessment is not None
-    assert loop.assessment.scale != before.scale
-    assert loop.assessment == ForceLoop(ARM, slightly, own, CLOCK).assessment
-    assert loop.report is not report
+    usual, other = (ForceLoop(ARM, servo, own, CLOCK).assessment for servo in (SERVO, slightly))
+    assert usual is not None
+    assert other is not None
+    assert other.scale != usual.scale
 
 
 @pytest.mark.slow
 def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_off() -> None:
-    warned, silent = (Loop(guarded(replace(OWN, force_gain=(0.09,)), mode=mode)) for mode in ("warn", "off"))
-    for loop in (warned, silent):
-        loop.retune_servo(STIFF)
+    warned, silent = (
+        ForceLoop(ARM, STIFF, guarded(replace(OWN, force_gain=(0.09,)), mode=mode), CLOCK) for mode in ("warn", "off")
+    )
     assert warned.report.is_warning
-    silent.retune_servo(SERVO)
     assert silent.assessment is None
 
 
@@ -245,17 +235,14 @@ def test_mode_limit_lowers_the_gains_to_what_a_refusal_allows() -> None:
     assert "lowered to be stable: force_gain [" in lowered.report.message
     assert lowered.assessment is not None
     assert lowered.assessment.domain is Domain.I
-    lowered.retune_servo(TESTBED.shared.servo)
-    assert lowered.parameters.force_gain == pytest.approx([allowed], rel=0.01), "of the gain that was given"
 
 
 def test_mode_limit_lowers_the_posture_gain_where_the_velocity_loop_is_too_slow_for_it() -> None:
-    slow, loop = replace(SERVO, proportional_gain=tuple(0.4 * gain for gain in SERVO.proportional_gain)), Loop(OWN)
+    slow = replace(SERVO, proportional_gain=tuple(0.4 * gain for gain in SERVO.proportional_gain))
     ServoGuard(ARM, CLOCK, WAM.node("velocity_loop", VelocityLoopParameters).guard).require_stable(slow)
     with pytest.raises(ParameterError, match="lower posture_gain"):
-        loop.retune_servo(slow)
-    loop.tune(guarded(OWN, mode="limit"))
-    loop.retune_servo(slow)
+        ForceLoop(ARM, slow, OWN, CLOCK)
+    loop = ForceLoop(ARM, slow, guarded(OWN, mode="limit"), CLOCK)
     assert loop.parameters.posture_gain < 0.5 * OWN.posture_gain
     assert "lowered to be stable: posture_gain [" in loop.report.message
 

@@ -161,19 +161,6 @@ def test_motors_do_not_mix() -> None:
     assert currents == pytest.approx(expected)
 
 
-def test_gains_change_without_a_jump_of_the_integral() -> None:
-    rotor = Rotor()
-    rotor.blocked = True
-    for _ in range(500):
-        rotor.step([2.0])
-    rotor.step([0.0])
-    before = rotor.step([0.0])
-    assert before == pytest.approx(0.8)
-    rotor.loop.tune(Servo((0.1,), (8.0,)), OWN)  # type: ignore[union-attr]
-    assert rotor.step([0.0]) == before
-    assert rotor.step([1.0]) == pytest.approx(before + 0.1 + 8.0 * DT)
-
-
 def test_commanded_velocity_and_feedforward_change_no_faster_than_their_limits() -> None:
     slow = VelocityLoop(ONE, Servo((KP,), (0.0,)), VelocityLoopParameters(STILL, OFF, 500.0, 200.0))
     fast = VelocityLoop(ONE, Servo((KP,), (0.0,)), OWN)

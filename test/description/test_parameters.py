@@ -15,7 +15,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters,
 from rclpy.parameter import Parameter
 
 from wam_cli.commands.conform import on_bus
-from wam_description.arm import Servo, Shared
+from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import declared
 from wam_description.nodes import NODES
@@ -174,7 +174,7 @@ def test_every_parameter_is_described_to_ros(ros: Any) -> None:
     for field, there in zip(described, answer.descriptors, strict=True):
         assert there.description.startswith(field.doc)
         assert (f"[{field.unit}]" in there.description) == bool(field.unit)
-        assert there.read_only is (not field.live or field.name.startswith("servo."))
+        assert there.read_only is not field.live
         assert there.additional_constraints == field.allowed
         for limits in (*there.floating_point_range, *there.integer_range):
             assert limits.from_value == max(field.low, -1e308)
@@ -191,14 +191,13 @@ def change(ros: Any, node: str, **given: Any) -> Any:
 
 
 def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
-    node = make(ros, "velocity_loop")
-    raised, halved = [0.016, 0.016, 0.016, 0.011], [0.4, 0.4, 0.4, 0.25]
-    assert change(ros, "velocity_loop", **{"servo.proportional_gain": raised, "servo.integral_gain": halved}).successful
-    assert node.node._loop._kp == tuple(raised)
-    assert node.node._loop._ki == tuple(halved)
-    request = GetParameters.Request(names=["servo.proportional_gain", "servo.integral_gain"])
-    answer = call(ros, GetParameters, "velocity_loop/get_parameters", request)
-    assert [list(value.double_array_value) for value in answer.values] == [raised, halved]
+    node = make(ros, "force_loop")
+    lower, slower = [0.02], [0.001]
+    assert change(ros, "force_loop", force_gain=lower, torque_gain=slower).successful
+    own = node.node._loop.parameters
+    assert (own.force_gain, own.torque_gain) == (tuple(lower), tuple(slower))
+    answer = call(ros, GetParameters, "force_loop/get_parameters", GetParameters.Request(names=["force_gain"]))
+    assert [list(value.double_array_value) for value in answer.values] == [lower]
 
 
 @pytest.mark.parametrize(
@@ -232,11 +231,10 @@ def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, An
 @pytest.mark.parametrize(
     ("node", "given", "text"),
     [
-        ("velocity_loop", {"servo.proportional_gain": [1e308] * 4}, "allowed: 0 to 1e+09"),
-        ("velocity_loop", {"servo.proportional_gain": [0.3] * 4}, "allowed: servo.proportional_gain up to ["),
-        ("velocity_loop", {"servo.proportional_gain": [0.1] * 3}, "has 3 values; it needs 4"),
+        ("velocity_loop", {"servo.proportional_gain": [0.01] * 4}, "servo.proportional_gain' is chosen at the start"),
         ("velocity_loop", {"ages.command": 0.5}, "ages.command"),
-        ("gravity", {"servo.proportional_gain": [0.01] * 4}, "servo.proportional_gain"),
+        ("force_loop", {"force_gain": [1e308]}, "allowed: 0 to "),
+        ("force_loop", {"force_gain": [0.1] * 2}, "has 2 values; give 3, one for each of"),
         ("force_loop", {"force_limit": 1e308}, "force_limit"),
         ("force_loop", {"joint_speed_limit": 9.0}, "joint_speed_limit"),
         ("force_loop", {"limits.settling_time": 0.0}, "limits.settling_time out of range Min: 0.001"),
@@ -255,12 +253,12 @@ def test_a_value_that_cannot_be_taken_while_the_node_runs_is_refused(
     assert there.get_parameter(name).value == before
 
 
-def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
-    class Both:
-        name, parameters, owns = "velocity_loop", Gains, "servo"
+def test_a_node_that_fails_while_it_takes_a_set_keeps_the_old_one(ros: Any) -> None:
+    class Failing:
+        name, parameters = "velocity_loop", Gains
 
         def __init__(self, shared: Shared, own: Gains) -> None:
-            self.gain, self.servo = own.gain, shared.servo
+            self.gain = own.gain
 
         @reaction(Input("motor_states"), outputs=())
         def step(self, inputs: Inputs) -> Outputs:
@@ -270,26 +268,17 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
             self.gain = own.gain
             self.inverse = 1.0 / (own.gain - 0.75)
 
-        def retune(self, servo: Servo) -> None:
-            require(servo.integral_gain[0] < 100.0, "integral gain is too large")
-            self.servo = servo
-
-    own: dict[str, Any] = {"gain": 1.0, "names": ["a"], "weights": [1.0]}
-    given = {**WAM.sections[SHARED], **own}
+    given = {**WAM.sections[SHARED], "gain": 1.0, "names": ["a"], "weights": [1.0]}
     overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
-    node = ros.add(AdaptedNode(declaration(Both), namespace="/wam", context=ros.context, parameter_overrides=overrides))
-    before = node.node.servo
-    for given, reason in (
-        ({"gain": 2.0, "servo.integral_gain": [200.0] * 4}, "integral gain is too large"),
-        ({"gain": 0.75, "servo.integral_gain": [3.0] * 4}, "failed while it set the parameters: ZeroDivisionError"),
-    ):
-        refused = change(ros, "velocity_loop", **given)
-        assert not refused.successful
-        assert reason in refused.reason
-        assert (node.node.gain, node.node.servo) == (1.0, before)
-        assert node.get_parameter("gain").value == 1.0
-    assert change(ros, "velocity_loop", gain=1.5, **{"servo.integral_gain": [3.0] * 4}).successful
-    assert (node.node.gain, node.node.servo.integral_gain) == (1.5, (3.0,) * 4)
+    node = ros.add(
+        AdaptedNode(declaration(Failing), namespace="/wam", context=ros.context, parameter_overrides=overrides)
+    )
+    refused = change(ros, "velocity_loop", gain=0.75)
+    assert not refused.successful
+    assert "failed while it set the parameters: ZeroDivisionError" in refused.reason
+    assert node.node.gain == node.get_parameter("gain").value == 1.0
+    assert change(ros, "velocity_loop", gain=1.5).successful
+    assert node.node.gain == 1.5
 
 
 def test_an_answer_without_a_result_is_no_success() -> None:

@@ -126,7 +126,7 @@ class ForceLoop:
     def __init__(
         self, arm: Arm, servo: Servo, parameters: ForceLoopParameters, timing: Timing, command_age: float = math.inf
     ) -> None:
-        self._timing, self._body = timing, RigidBody(arm)
+        self._timing, self._servo, self._body = timing, servo, RigidBody(arm)
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._measurement = ForceMeasurement(self._body)
         self._pushed = PushedArm(self._body)
@@ -134,16 +134,9 @@ class ForceLoop:
         self._pressed_at: Array | None = None
         self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
-        self._take(servo, parameters)
+        self.tune(parameters)
         zero = np.zeros(len(self._velocity))
         self._run = CommandRun(None, None, arm, timing, zero, zero, False)
-
-    def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
-        arm = self._body.arm
-        parameters.require_fit(arm)
-        self._supervision = Supervision(arm, servo, self._timing, parameters, tuple(self._q))
-        self._given, self.parameters = parameters, self._supervision.parameters
-        self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, sensing_of(parameters)))
 
     def tune(self, parameters: ForceLoopParameters) -> None:
         """Take new parameters, or refuse the set.
@@ -154,11 +147,11 @@ class ForceLoop:
             where values do not fit each other or the arm, or the guard does not accept the set; nothing has
             changed then.
         """
-        self._take(self._supervision.servo, parameters)
-
-    def retune_servo(self, servo: Servo) -> None:
-        """Take new gains of the velocity loop, on which the guard relies, or refuse them, as `tune` does."""
-        self._take(servo, self._given)
+        arm = self._body.arm
+        parameters.require_fit(arm)
+        self._supervision = Supervision(arm, self._servo, self._timing, parameters, tuple(self._q))
+        self.parameters = self._supervision.parameters
+        self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, sensing_of(parameters)))
 
     @property
     def event(self) -> Event:
@@ -366,7 +359,7 @@ class ForceLoop:
         wanted = own.posture_gain * (np.array(posture) + run.approached - q) + (0.0 if rate is None else np.array(rate))
         wanted = np.minimum(np.maximum(wanted, -own.joint_speed_limit), own.joint_speed_limit)  # np.clip takes longer
         is_watched = bool(axes) and own.is_estimated and not run.is_touching
-        is_watching = is_watched and run.shaking.is_watching(self._q, self._axes.forces, self._supervision.servo, dt)
+        is_watching = is_watched and run.shaking.is_watching(self._q, self._axes.forces, self._servo, dt)
         torque_sd = self._measurement.torques.sd
         if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
             run.still_sd = torque_sd

@@ -17,7 +17,7 @@ from wam_description.signals import BASE, ZERO, Answer, ForceCommand, NodeStatus
 from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
 from wam_description.topics import FORCE_AXIS_COLUMNS
-from wam_description.wiring import Followed, Input, Outputs, reaction
+from wam_description.wiring import Input, Outputs, reaction
 
 
 class ForceLoopNode:
@@ -25,12 +25,10 @@ class ForceLoopNode:
 
     name, parameters = "force_loop", ForceLoopParameters
     services = ("tare",)
-    follows = Followed("velocity_loop", "servo")
 
     def __init__(self, shared: Shared, own: ForceLoopParameters) -> None:
         self._loop = ForceLoop(shared.model_arm, shared.servo, own, shared.timing, shared.ages.command)
         self.tune = self._loop.tune
-        self.retune = self._loop.retune_servo
         self._arm = shared.arm
         self._player = TrajectoryPlayer(shared.arm, shared.motion)
         self._is_on_trajectory = False

@@ -47,7 +47,7 @@ class Supervision:
 
     Attributes
     ----------
-    servo, servo_stiffness : gains of the velocity loop, and its integral gains at the joints (n, n), N m/rad.
+    servo_stiffness : integral gains of the velocity loop at the joints (n, n), N m/rad.
     parameters : those in force.
     force_law, torque_law : laws in force.
     assessment : what the guard finds; None where it is off or nothing is fed back.
@@ -64,7 +64,7 @@ class Supervision:
     def __init__(
         self, arm: Arm, servo: Servo, timing: Timing, parameters: ForceLoopParameters, q: tuple[float, ...]
     ) -> None:
-        self.parameters, self.servo = parameters, servo
+        self.parameters = parameters
         self.servo_stiffness = TransmissionMap.of(arm).at_joints(servo.integral_gain)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None

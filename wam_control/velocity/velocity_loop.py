@@ -43,17 +43,7 @@ class VelocityLoop:
         self._limits = list(zip(motors.peak_torque, motors.torque_constant, strict=True))
         n = len(self._limits)
         self._integral, self._commanded, self._velocity, self._feedforward = ([0.0] * n for _ in range(4))
-        self.tune(servo, parameters)
-
-    def tune(self, servo: Servo, parameters: VelocityLoopParameters) -> None:
-        """Take new gains; the integral, kept as a torque, does not jump.
-
-        Raises
-        ------
-        ParameterError
-            where there is not one of each gain per motor; the gains in use stay.
-        """
-        aligned("servo", self._motors.names, servo)
+        aligned("servo", motors.names, servo)
         self._kp, self._ki = servo.proportional_gain, servo.integral_gain
         self._acceleration, self._torque_rate = parameters.acceleration_limit, parameters.torque_rate_limit
 

@@ -5,7 +5,7 @@ from operator import gt
 from wam_control.velocity.dither import Dither
 from wam_control.velocity.servo_guard import ServoGuard
 from wam_control.velocity.velocity_loop import SERVO_REACTION, VelocityLoop, VelocityLoopParameters
-from wam_description.arm import Servo, Shared
+from wam_description.arm import Shared
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
@@ -17,15 +17,12 @@ class VelocityLoopNode:
 
     name, parameters = "velocity_loop", VelocityLoopParameters
     high_priority = True
-    owns = "servo"
 
     def __init__(self, shared: Shared, own: VelocityLoopParameters) -> None:
-        self._own = own
-        self._guard = ServoGuard(shared.model_arm, shared.timing, own.guard)
-        self._guard.require_stable(shared.servo)
+        ServoGuard(shared.model_arm, shared.timing, own.guard).require_stable(shared.servo)
         self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
         self._shared = shared
-        self._set_dither(own)
+        self.tune(own)
         zero = [0.0] * len(shared.arm.motors.names)
         self._motors = shared.arm.motors.names
         self._fastest = TransmissionMap.of(shared.arm).largest_motor_velocities(shared.arm.joints.speed_limit)
@@ -64,20 +61,11 @@ class VelocityLoopNode:
         )
         return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
 
-    def _set_dither(self, own: VelocityLoopParameters) -> None:
+    def tune(self, own: VelocityLoopParameters) -> None:
+        """Take another level of the dither while the arm moves; the other parameters need a restart."""
         dither = Dither(self._shared.model_arm, self._shared.timing, own.dither)
         self._cost = dither.cost(self._shared.arm.joints.start)
         self._dither = dither
-
-    def tune(self, own: VelocityLoopParameters) -> None:
-        """Take another level of the dither while the arm moves; the other parameters need a restart."""
-        self._set_dither(own)
-        self._own = own
-
-    def retune(self, servo: Servo) -> None:
-        """Take new gains while the arm moves, or refuse them."""
-        self._guard.require_stable(servo)
-        self._loop.tune(servo, self._own)
 
     def diagnostics(self) -> dict[str, str]:
         """What the dither costs, where it is on."""

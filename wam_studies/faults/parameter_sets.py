@@ -148,14 +148,9 @@ def play(case: FaultCase) -> FaultTrial:
 
 
 def _fields(stack: WatchedStack, name: str) -> list[Field]:
-    """Parameters of a node; only its own are live there, apart from a shared group that it owns."""
-    declaration = declared(name)
-    owned = getattr(declaration.node, "owns", None)
-    own = list(fields(declaration.parameter_class))
-    shared = [
-        one._replace(live=one.live and owned is not None and one.name.startswith(f"{owned}.")) for one in fields(Shared)
-    ]
-    return [one for one in (*own, *shared) if stack.nodes[name].has_parameter(one.name)]
+    """Parameters of a node."""
+    found = (*fields(declared(name).parameter_class), *fields(Shared))
+    return [one for one in found if stack.nodes[name].has_parameter(one.name)]
 
 
 def _present(stack: WatchedStack, name: str) -> dict[str, Any]:
