@@ -240,8 +240,9 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="each (also without a value): one process for each node. grouped: three processes, one for driver and "
-        "velocity loop, one for the recorder, one for all others. Default: one process; in realtime: grouped",
+        help="each (also without a value): one process for each node. grouped: one for driver and velocity loop, one "
+        "for the recorder, one for the other packaged nodes, one for each node of your own without high_priority. "
+        "Default: one process; in realtime: grouped",
     )
     parser.add_argument(
         "--realtime",

@@ -161,8 +161,12 @@ def _refusal(cls: type, values: Values) -> str:
 
 
 def _differences(node: str, recorded: Values) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names that the recorded parameters of a node lack, and those that it does not have; none of a foreign node."""
-    if node not in NODES or node == "recorder":
+    """Names that the recorded parameters of a node lack, and those that it does not have; none of a foreign node.
+
+    A node that `nodes` does not list has its own class, as the driver of a real arm.
+    """
+    listed = recorded.get("nodes")
+    if node not in NODES or node == "recorder" or (isinstance(listed, list) and node not in listed):
         return (), ()
     known = {field.name: field for cls in (Shared, declared(node).parameter_class) for field in fields(cls)}
     missing = [name for name, field in known.items() if name not in recorded and field.is_required]

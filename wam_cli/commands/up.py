@@ -16,17 +16,11 @@ from wam_cli.options import (
 )
 from wam_control.task.scenario import load_for
 from wam_description.configuration import Configuration
-from wam_description.nodes import EACH, GROUPED, ONE
-from wam_ros.bring_up import process_of, start
+from wam_description.nodes import ONE
+from wam_ros.bring_up import Processes, process_of, start
 from wam_ros.node import node_factory
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_ros.run import die_with_parent
-
-WHERE = {
-    ONE: "this process",
-    GROUPED: "processes of driver and velocity loop, recorder, others",
-    EACH: "processes of their own",
-}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,13 +64,13 @@ def run(given: argparse.Namespace) -> int:
             )
     import_nodes(configuration, given)
     stop = Stop()
-    processes = processes_of(configuration, given)
     with (
         page_next_to(given, given.namespace, lambda: stop.is_set) as close_page,
-        start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
+        start(configuration, processes_of(configuration, given), lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:
-            where = WHERE[processes]
+            each = stack.processes if isinstance(stack, Processes) else ()
+            where = f"{len(each)} processes ({'; '.join(each)})" if each else "this process"
             print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
         failures = stack.failures
