@@ -90,28 +90,14 @@ class Supervision:
         ]
         task, found = self._assess(contacts)
         if parameters.guard.mode == "limit":
-            if not found.scale:
-                task, found = self._soften(contacts)
+            if not found.scale and (gain := guard.softer_hold(task, contacts)):
+                self.parameters = replace(self.parameters, posture_gain=gain)
+                task, found = self._assess(contacts)
             if found.reason and found.scale:
                 self.parameters = _accepted(self.parameters, guard.accepted_scale(found))
                 task, found = self._assess(contacts)
         require(not found.reason or parameters.guard.mode == "warn", found.reason)
         self.assessment, self.watch = found, Watch(guard, task, found)
-
-    def _soften(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
-        """Lower the gain of the posture until some force gain is stable, and then by `stability_fraction`.
-
-        A velocity loop whose gains are stable by themselves may be too slow for the posture that it has to hold.
-        """
-        given, gain = self.parameters, self.parameters.posture_gain
-        for _ in range(GUARD.halvings):
-            gain *= 0.5
-            self.parameters = replace(given, posture_gain=gain)
-            if self._assess(contacts)[1].scale:
-                self.parameters = replace(given, posture_gain=given.guard.stability_fraction * gain)
-                return self._assess(contacts)
-        self.parameters = given
-        return self._assess(contacts)
 
     def _assess(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
         task = task_of(self.parameters)

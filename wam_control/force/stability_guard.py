@@ -7,7 +7,7 @@ the loop for small errors (domain II); the guard does not rely on that.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -264,7 +264,22 @@ class StabilityGuard:
         where = f"{along} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
         domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
         found = GuardAssessment(domain, scale, stiffness, stiction_cycle(node, max(law.gain)), where, "")
-        return found if domain is Domain.I else found._replace(reason=self._refusal(law, found))
+        if domain is Domain.I:
+            return found
+        return found._replace(reason=self._refusal(law, found) if scale else self._hopeless(task, contacts, found))
+
+    def softer_hold(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> float:
+        """A posture gain, 1/s, with which some force gain is stable where none is with the given one; 0 for none.
+
+        A velocity loop whose gains are stable by themselves may be too slow for the posture that it has to hold.
+        """
+        halved = (task.hold_gain * 0.5**i for i in range(1, GUARD.halvings + 1))
+        stable = (gain for gain in halved if self._controls(task._replace(hold_gain=gain), contacts))
+        return self.parameters.stability_fraction * next(stable, 0.0)
+
+    def _controls(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> bool:
+        """Whether some force gain is stable."""
+        return all(self.scales(task, contacts, SCALES[:1]))
 
     def accepted_scale(self, found: GuardAssessment) -> float:
         """Factor of the gains up to which they are accepted as domain I."""
@@ -300,16 +315,23 @@ class StabilityGuard:
         """Why gains above their linear margin are refused, and what would be accepted."""
         most = self.accepted_scale(found)
         surface = f"contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
-        if not found.scale:
-            also = ", force_proportional_gain" if any(law.proportional_gain) else ""
-            return (
-                f"force_gain {listed(law.gain)} is not stable, nor is any smaller one ({found.where}, {surface}); "
-                f"lower posture_gain{also} or guard.contact_stiffness"
-            )
         return (
             f"force_gain {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one: domain "
             f"{found.domain}; allowed: force_gain up to {listed([rounded_down(most * each) for each in law.gain])}; "
             f"guard.stability_fraction is {self.parameters.stability_fraction:g}; worst case: {found.where}, {surface}"
+        )
+
+    def _hopeless(self, task: GuardedTask, contacts: Sequence[GuardedContact], found: GuardAssessment) -> str:
+        """Why every force gain is refused, and what of that would help which was tried."""
+        arm, servo, timing, own, sensing = self._whole
+        half = replace(own, contact_stiffness=0.5 * own.contact_stiffness)
+        gain = self.softer_hold(task, contacts)
+        ways = [f"lower posture_gain to {rounded_down(gain):g}"] * bool(gain)
+        if StabilityGuard(arm, servo, timing, half, sensing)._controls(task, contacts):
+            ways.append(f"declare softer surfaces (guard.contact_stiffness={half.contact_stiffness:g})")
+        return (
+            f"force_gain {listed(task.law.gain)} is not stable, nor is any smaller one ({found.where}, contact up to "
+            f"{own.contact_stiffness:g} N/m); {' or '.join(ways) or 'change the gains of the velocity loop, servo'}"
         )
 
     def _delays(self, task: GuardedTask) -> list[int]:
