@@ -21,7 +21,8 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the force may also act along this link: then the torques show neither its position nor the link",
+    Reason.ALONG: "the estimate assumes a force across this link; the torques also fit one along it, on it or on "
+    "the link before",
     Reason.PAYLOAD: "a picked-up payload may explain the torques; its probability is 1 minus those of the links",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "the arm is braked",
@@ -35,7 +36,7 @@ RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g}
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": (
         "the measured torques",
-        "use joint sensors or the dither (timing.dither_cycle=40), or tare in free space",
+        "use joint sensors, or the dither if it is off (timing.dither_cycle=40)",
     ),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),
@@ -54,7 +55,9 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     ),
 }
 INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
-    ("torques", "sensors"): "tare in free space, or command fewer forces at once",
+    ("torques", "sensors"): "raise limits.tolerance, or command fewer forces at once",
+    ("shaking_arm", "sensors"): "end the dither (timing.dither_cycle=0), or set guard.contact_stiffness to that of the "
+    "surface",
     ("place", "pinned"): "bend the arm, or lower contact_position_sd if the position is known better",
 }
 UNKNOWN: Final = "{desired:.3g} {unit} at {where} cannot be controlled because of {part_text}"
@@ -62,6 +65,11 @@ UNCERTAIN: Final = (
     "{desired:.3g} {unit} at {where} may be wrong by {error:b} {unit}, mostly because of {part_text}; allowed: "
     "{allowed:b} {unit} (limits.tolerance)"
 )
+KEEPS_PRESSING: Final = ": {part_help}; meanwhile the arm presses on"
+UNBOUNDED: Final = {  # by cause, in place of the next table where the error is infinite
+    "error": UNKNOWN + ": {help}",
+    "uncertain": UNKNOWN + KEEPS_PRESSING,
+}
 SENTENCES: Final = {  # by cause
     # the arm holds
     "error": UNCERTAIN + ": {help}",
@@ -73,7 +81,7 @@ SENTENCES: Final = {  # by cause
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
     "(limits.free_travel): end the command, then begin again",
     # the arm goes on
-    "uncertain": UNCERTAIN + "; the arm keeps pressing: {part_help}",
+    "uncertain": UNCERTAIN + KEEPS_PRESSING,
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
     "measured: command a force that the arm can reach, or bend the arm",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
@@ -93,7 +101,7 @@ SENTENCES: Final = {  # by cause
     "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there: "
     "command another posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
-    "{allowed:g} times the commanded force (limits.cycle_force): lower force_gain, or use joint sensors",
+    "{allowed:g} times the commanded force (limits.cycle_force): {calm}",
     "model_off": "the {part} differs from the configured one: if this lasts, declare the load (arm.payload) or run "
     "'wam identify'; /diagnostics has the difference",
     # the driver has put the brakes on
@@ -102,7 +110,7 @@ SENTENCES: Final = {  # by cause
     "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {cure}",
     "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {step}: make its "
     "steps faster, or run it in its own process",
-    "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
+    "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}; then reset_fault",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is back where it was before this step; "
     "{cure}, or lower timing.period",
     "limit": "{excess}; {cure}",
@@ -110,13 +118,14 @@ SENTENCES: Final = {  # by cause
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one, then reset_fault",
-    "stopped": "{nodes} has stopped or is very slow: no new {topics}; start it again, or end other programs if "
-    "the computer is busy, then reset_fault",
+    "stopped": "{nodes} has stopped or is very slow: no new {topics}; start it again, or 'wam up' if that started it; "
+    "or end other programs if the computer is busy; then reset_fault",
     "long_step": "{step}: no new {topics}; make its steps faster, then reset_fault",
-    "ended": "{node} has ended; start it again, then reset_fault",
+    "ended": "{node} has ended; start it again, or 'wam up' if that started it; then reset_fault",
 }
 HOLDING: Final = "; the arm holds its position"
 SINCE: Final = ("without a contact", "since the force was last right or rising")
+CALM: Final = ("lower force_gain", "lower force_gain, or use joint sensors")
 
 
 class _Sentence(string.Formatter):
@@ -140,10 +149,8 @@ def sentence(event: Event) -> str:
     if cause not in SENTENCES:
         return str(event.values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
     values = {**event.values, **_parts(event.values)}
-    end = HOLDING if event.holds and "hold" not in SENTENCES[cause] and "goes back" not in SENTENCES[cause] else ""
-    text = SENTENCES[cause]
-    if values.get("error") == math.inf:
-        text = text.replace(UNCERTAIN, UNKNOWN)
+    text = (UNBOUNDED if values.get("error") == math.inf else SENTENCES)[cause]
+    end = HOLDING if event.holds and "hold" not in text and "goes back" not in text else ""
     return _Sentence(_digits(event.values)).vformat(text, (), values) + end
 
 
@@ -160,7 +167,7 @@ def sentences(events: Iterable[Event]) -> str:
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     """What the placeholders of a sentence stand for that are no values."""
-    found = {"since": SINCE[values.get("has_touched", 0.0) > 0.0]}
+    found = {"since": SINCE[values.get("has_touched", 0.0) > 0.0], "calm": CALM[values.get("source") == "motors"]}
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         helps = INSTEAD.get((values["part"], values["source"]), helps)

@@ -239,7 +239,7 @@ class Driver:
             return f"a push acts ({now}): push or command less"
         if pushed and since <= DRIVER.recent:
             return f"a push acted until {since:.2f} s before ({pushed}): push or command less"
-        return "command less"
+        return "command less; if little is commanded, a controller has a wrong sign or too large a gain"
 
     def _watch_braking(self) -> None:
         """Name the first cable that breaks under the brakes."""

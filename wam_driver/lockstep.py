@@ -19,7 +19,7 @@ def unpublished(found: Mapping[str, Sequence[str]]) -> str:
     which = " and ".join(topics)
     if not node:
         return f"list a node in 'nodes' that publishes {which}"
-    return f"{node} runs, but did not publish {which}: each of its steps must return that"
+    return f"{node} runs, but did not publish {which}: its step has to return this each time"
 
 
 class Lockstep:
@@ -141,7 +141,7 @@ class Lockstep:
     def _cause(self, missing: list[str]) -> str:
         """The node that is the reason, and what to do about it."""
         if silent := ", ".join(self._session.silent):
-            return f"{silent} has stopped or is very slow; start it again"
+            return f"{silent} has stopped or is very slow; start it again, or 'wam up' if that started it"
         found = self._interface.unanswered(missing, self._session.awaited)
         unknown = sorted(found.keys() - self._session.awaited.keys() - {""})
         if unknown or not found:
@@ -163,7 +163,7 @@ class Lockstep:
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
         if self._started and self._patience < self._timing.timeout:
-            return f"no {' and '.join(self._senders)} arrives; {self._advice}, then enable"
+            return f"no {' and '.join(self._senders)} arrives; {self._advice}; then enable"
         return ""
 
     def pause(self, on: bool) -> None:

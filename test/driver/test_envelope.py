@@ -192,7 +192,7 @@ def test_a_fault_names_the_push_that_acts_or_has_just_acted(ended: float) -> Non
     reason, _, advice = hardware.safety.fault.partition("; ")
     assert reason.startswith("speed of the tip ")
     if ended > DRIVER.recent:
-        assert advice == "command less"
+        assert advice == "command less; if little is commanded, a controller has a wrong sign or too large a gain"
     elif ended:
         assert re.fullmatch(r"a push acted until 0.\d\d s before \(1.2 N on outer_link\): push or command less", advice)
     else:

@@ -150,8 +150,8 @@ def test_a_period_passes_when_the_state_is_answered_and_the_next_is_due() -> Non
 
 STOPPED = [
     (["gravity", "velocity_loop"], "check that velocity_loop runs"),
-    (["velocity_loop"], "gravity has stopped or is very slow; start it again"),
-    ([], "gravity, velocity_loop has stopped or is very slow; start it again"),
+    (["velocity_loop"], "gravity has stopped or is very slow; start it again, or 'wam up' if that started it"),
+    ([], "gravity, velocity_loop has stopped or is very slow; start it again, or 'wam up' if that started it"),
 ]
 
 
@@ -171,14 +171,14 @@ def test_an_answer_that_does_not_come_is_a_fault_by_name_braked_or_not(
         lockstep.watch()
         assert bench.clock.time - begin < 2.0
     assert bench.driver.safety.fault == (
-        f"lockstep: no motor_current_command for the state at 1000000 ns within 1.5 s; {advice}, then reset_fault"
+        f"lockstep: no motor_current_command for the state at 1000000 ns within 1.5 s; {advice}; then reset_fault"
     )
     assert bench.driver.currents == [0.0] * 4
     sent = len(bench.sent)
     bench.clock.time += DRIVER.watch
     lockstep.watch()
     assert len(bench.sent) == sent + 1, "time creeps, so that a node that was restarted is sent states"
-    assert lockstep.obstacle() == f"no motor_current_command arrives; {advice}, then enable"
+    assert lockstep.obstacle() == f"no motor_current_command arrives; {advice}; then enable"
     lockstep.take_currents(bench.driver.stamp, HOLDING)
     assert lockstep.obstacle() == ""
 

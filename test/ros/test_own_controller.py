@@ -432,7 +432,7 @@ def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_t
     plan = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("wait", 2.0)]
     run = Simulation(without(wam, "gravity"), plan, {"my_gravity": silent})
     failure = run.play()
-    assert "my_gravity runs, but did not publish gravity_effort: each of its steps must return that" in failure
+    assert "my_gravity runs, but did not publish gravity_effort: its step has to return this each time" in failure
     assert run.driver.safety.fault in failure
 
 

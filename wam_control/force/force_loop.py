@@ -199,7 +199,10 @@ class ForceLoop:
         if self._run.axes:
             return "a force is commanded: end the command, and free the arm"
         if self._measurement.speed >= MOTION.at_rest:
-            return "the arm moves: let it come to rest"
+            # the mean speed of an arm that has stopped is that of an arm at rest after this time
+            fastest = max(self._body.arm.joints.speed_limit)
+            seconds = math.ceil(10.0 * FORCE.steady_time * math.log(fastest / MOTION.at_rest)) / 10.0
+            return f"the arm moves: let it rest for {seconds:g} s first"
         if not self._has_left:
             return "the arm is still where it pressed: move it away first"
         self._measurement.tare()

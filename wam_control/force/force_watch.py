@@ -121,7 +121,10 @@ class Oscillation:
         is_swinging = count > FORCE.turns
         if is_swinging:
             swing, period = self._turns.swing
-            self._values = {"swing": swing, "period": period, "desired": desired, "allowed": own.limits.cycle_force}
+            source, allowed = _source(own), own.limits.cycle_force
+            self._values = {
+                "swing": swing, "period": period, "desired": desired, "allowed": allowed, "source": source
+            }  # fmt: skip
         if faint > FORCE.turns // 2 and self.share > FORCE.least_share:
             self.share *= FORCE.slowed
             self.rest()
@@ -214,7 +217,7 @@ class ForceWatch:
             self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
         is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
         self._is_decided = self._is_decided or (is_there and not self._is_refused)
-        part, source = known.errors.cause, "motors" if own.is_estimated else "sensors"
+        part, source = known.errors.cause, _source(own)
         if part == "place" and place is not None:
             source = "pinned" if place.is_pinned else "estimated"
         values: dict[str, Value] = {
@@ -322,6 +325,11 @@ class MotionWatch:
             allowed=allowed,
             time=lasting,
         )
+
+
+def _source(own: ForceLoopParameters) -> str:
+    """What measures the force."""
+    return "motors" if own.is_estimated else "sensors"
 
 
 def _unit(axis: CommandedAxis) -> str:
