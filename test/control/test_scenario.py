@@ -250,10 +250,10 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         ({**WHOLE, "force": {"frame": "base"}}, "force: 'newtons' is missing"),
         ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
         ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
-        (placed(0.28, "base"), "contact_position is given; it needs the frame of a link and a force across it"),
+        (placed(0.28, "base"), "contact_position is in m along a cover: command a force across it, in its frame"),
         (
             placed(0.28, newtons=[1, 0, 0]),
-            "contact_position is given; it needs the frame of a link and a force across it",
+            "contact_position is in m along a cover: command a force across it, in its frame",
         ),
         (placed(0.0), "contact_position is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
         ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, contact_position"),

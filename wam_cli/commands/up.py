@@ -64,9 +64,10 @@ def run(given: argparse.Namespace) -> int:
             )
     import_nodes(configuration, given)
     stop = Stop()
+    processes = processes_of(configuration, given)
     with (
         page_next_to(given, given.namespace, lambda: stop.is_set) as close_page,
-        start(configuration, processes_of(configuration, given), lambda: stop.is_set, given.namespace, given.log_level) as stack,
+        start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:
             each = stack.processes if isinstance(stack, Processes) else ()

@@ -39,7 +39,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force on the world, N, in `base` or in the "
-    "frame of a cover. Optional: `contact_position`, where it acts, m along the cover; `rise`, its rise time, s",
+    "frame of a cover. Optional: `contact_position`, where it acts, m along the cover, for a force across the cover, "
+    "in its frame; `rise`, its rise time, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "the torque of each joint on the world, N m; it is sent as a `task`",
     "until_force": "force, N; the step ends when a contact with this force is detected, and fails without one",
@@ -48,7 +49,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "
     "`contact_position` is in m along the cover, `newtons` in its frame. Optional: `begin` and `end`, s from the start "
     "of the step",
-    "request": "called at the start of the step: `enable`, `disable`, or `tare` if the arm is at rest",
+    "request": "called at the start of the step: `enable`, `disable`, or `tare`; a tare needs half a second of "
+    "rest before it",
     "set": "`{force_loop: {force_gain: [0.01]}}`: sets *live* parameters of driver or force_loop at the start of the "
     "step; these may change while the node runs",
 }
@@ -632,7 +634,7 @@ def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
     place = number(where, "contact_position", body["contact_position"])
     require(
         link != BASE and any(newtons[1:]),
-        f"{where}: contact_position is given; it needs the frame of a link and a force across it",
+        f"{where}: contact_position is in m along a cover: command a force across it, in its frame",
     )
     length = arm.covers.length_of(link)
     require(
