@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyder, polyroots, polyval
 from numpy.typing import NDArray
 
 from wam_control.thresholds import MOTION
@@ -127,7 +127,8 @@ class PostureMotion:
     """
 
     def __init__(self, start: Sequence[float], trajectory: PosturePath, arm: Arm, limits: MotionParameters) -> None:
-        self._joints, self._limits = arm.joints, limits
+        self._joints = arm.joints
+        self._allowed = limits.joint_speed, limits.joint_acceleration, limits.joint_jerk
         points = trajectory.points
         require(len(points) > 0, "the trajectory has no points; give at least one")
         if len(points) > 1 and points[0].time == 0.0 and any(point.time for point in points):
@@ -140,7 +141,7 @@ class PostureMotion:
         self._parts = (
             self._timed(postures, points)
             if any(times)
-            else [_Straight(a, b, self._limits) for a, b in pairwise(postures)]
+            else [_Straight(a, b, self._allowed) for a, b in pairwise(postures)]
         )
         self.duration = sum(part.duration for part in self._parts)
         self.fastest = [max(each) for each in zip(*(part.fastest for part in self._parts), strict=True)]
@@ -184,10 +185,9 @@ class PostureMotion:
 
     def _require_all(self, quintics: "_Quintics") -> None:
         """Refuse a part whose derivatives or angles are beyond the limits, the first one by name."""
-        allowed = (self._limits.joint_speed, self._limits.joint_acceleration, self._limits.joint_jerk)
-        largest = [quintics.largest(order) for order in range(1, len(allowed) + 1)]
+        largest = [quintics.largest(order) for order in range(1, len(self._allowed) + 1)]
         is_doubtful = quintics.may_leave(self._joints.lower, self._joints.upper)
-        for found, limit in zip(largest, allowed, strict=True):
+        for found, limit in zip(largest, self._allowed, strict=True):
             is_doubtful |= (found > limit).any(axis=1)
         for part in np.flatnonzero(is_doubtful):
             for order, found in enumerate(largest, 1):
@@ -210,9 +210,8 @@ class PostureMotion:
 
     def _require_within(self, order: int, sizes: Sequence[float]) -> None:
         """Refuse a derivative, of this order and size (n,), that is beyond the limits."""
-        limits = (self._limits.joint_speed, self._limits.joint_acceleration, self._limits.joint_jerk)
         unit = UNITS[order - 1]
-        for name, size, limit in zip(self._joints.names, sizes, limits[order - 1], strict=True):
+        for name, size, limit in zip(self._joints.names, sizes, self._allowed[order - 1], strict=True):
             require(
                 size <= limit * (1.0 + MOTION.rounding),
                 f"{name} of the trajectory reaches {size:.3g} {unit}; allowed: {limit:g} {unit} (motion); give it "
@@ -328,9 +327,8 @@ class LineMotion:
 class _Straight:
     """Straight from one posture to another, from rest to rest, all joints with the same part of their way."""
 
-    def __init__(self, a: Sequence[float], b: Sequence[float], limits: MotionParameters) -> None:
+    def __init__(self, a: Sequence[float], b: Sequence[float], allowed: Sequence[Sequence[float]]) -> None:
         self._from, self._way = a, [y - x for x, y in zip(a, b, strict=True)]
-        allowed = (limits.joint_speed, limits.joint_acceleration, limits.joint_jerk)
         ways = [abs(way) for way in self._way]
         self._profile = None
         if max(ways) > MOTION.rounding:
@@ -348,14 +346,13 @@ class _Straight:
 
 
 class _Polynomials:
-    """One part of a trajectory: a polynomial for each joint, coefficients (k, n), the lowest order first."""
+    """One part of a trajectory: polynomials of angle and speed of each joint, coefficients (k, n), the lowest first."""
 
-    def __init__(self, coefficients: Array, duration: float, fastest: list[float]) -> None:
-        self._orders = (coefficients, _derivative(coefficients))
-        self.duration, self.fastest = duration, fastest
+    def __init__(self, orders: list[Array], duration: float, fastest: list[float]) -> None:
+        self._orders, self.duration, self.fastest = orders, duration, fastest
 
     def at(self, time: float) -> Moving:
-        return Moving(*(_value(order, time).tolist() for order in self._orders))
+        return Moving(*(np.asarray(polyval(time, order)).tolist() for order in self._orders))
 
 
 _Part = _Straight | _Polynomials
@@ -387,7 +384,7 @@ class _Quintics:
         ]
         self._orders = [np.array(coefficients)]
         for _ in UNITS:
-            self._orders.append(_derivative(self._orders[-1]))
+            self._orders.append(polyder(self._orders[-1]))
         # the control points of a polynomial bound it between its ends
         self._bounds = np.array(
             [a, a + va * t / 5.0, a + va * t * 0.4, a + way, a + way - vb * t / 5.0, a + way - vb * t * 0.4]
@@ -397,19 +394,19 @@ class _Quintics:
         """The parts, one by one."""
         fastest = self.largest(1).tolist()
         return [
-            _Polynomials(self._orders[0][:, i], float(span), fastest[i]) for i, span in enumerate(self._spans.tolist())
+            _Polynomials([order[:, i] for order in self._orders[:2]], span, fastest[i])
+            for i, span in enumerate(self._spans.tolist())
         ]
 
     def largest(self, order: int) -> Array:
         """Largest size of a derivative of the order 1 to 3 in each part (p, n)."""
         one = self._orders[order]
-        slope = self._orders[order + 1] if order < len(UNITS) else _derivative(one)
+        slope = self._orders[order + 1] if order < len(UNITS) else polyder(one)
         # the slope of the speed is 0 at the start of a part, so that a quadratic remains
         turns = _roots(*(slope[1:] if order == 1 else slope))
         spans = self._spans[:, np.newaxis] + np.zeros_like(one[0])
-        sizes = [
-            np.abs(_value(one, t)) for t in (np.zeros_like(spans), spans, *(np.clip(t, 0.0, spans) for t in turns))
-        ]
+        times = (np.zeros_like(spans), spans, *(np.clip(turn, 0.0, spans) for turn in turns))
+        sizes = [np.abs(polyval(time, one, tensor=False)) for time in times]
         largest: Array = np.max(sizes, axis=0)
         return largest
 
@@ -422,25 +419,10 @@ class _Quintics:
         span = float(self._spans[part])
         found = []
         for one in self._orders[0][:, part].T:
-            roots: list[complex] = Polynomial(one).deriv().roots().astype(complex).tolist()
+            roots: list[complex] = polyroots(polyder(one)).astype(complex).tolist()
             real = [r.real for r in roots if abs(r.imag) < MOTION.rounding * (1.0 + abs(r))]
-            found.append([float(_value(one, t)) for t in (0.0, span, *(r for r in real if 0.0 < r < span))])
+            found.append([float(polyval(t, one)) for t in (0.0, span, *(r for r in real if 0.0 < r < span))])
         return [[min(values) for values in found], [max(values) for values in found]]
-
-
-def _derivative(coefficients: Array) -> Array:
-    """Of polynomials, coefficients (k, ...), the lowest order first."""
-    factors = np.arange(1, len(coefficients)).reshape(-1, *[1] * (coefficients.ndim - 1))
-    derived: Array = factors * coefficients[1:]
-    return derived
-
-
-def _value(coefficients: Array, t: Array | float) -> Array:
-    """Of polynomials, coefficients (k, ...), at a time."""
-    value: Array = coefficients[-1] + 0.0 * t
-    for one in coefficients[-2::-1]:
-        value = one + value * t
-    return value
 
 
 def _roots(c: Array, b: Array, a: Array | float = 0.0) -> tuple[Array, ...]:
