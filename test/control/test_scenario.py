@@ -155,7 +155,7 @@ def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_pa
     """The inner tube is 1.6 in aside at the elbow: a push on the cover's axis would hardly touch it."""
     push = {"cover": "inner_link", "contact_position": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
     steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), SHARED)
-    out = play(Scenario(steps), 1)[0]
+    out = play(Scenario(steps, SHARED), 1)[0]
     np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
     same = ScenarioStep("a", 0.2, push=Push("inner_link", 0.5588, (0.0, 10.0, 0.0), 0.0, 0.1))
     np.testing.assert_allclose(play(Scenario([same], SHARED), 1)[0].push_torque, out.push_torque, rtol=1e-9)
@@ -198,7 +198,7 @@ def test_a_scenario_file_says_what_the_steps_are(tmp_path: Path) -> None:
         (0.1, -0.7, 0.05, 0.4),
         1.5,
         ForceCommand("outer_link", (0.0, -3.0, 1.0)),
-        Push("inner_link", 0.3, (0.0, 9.0, 2.0), 0.1, 0.4, (0.0, 0.04064 * 0.3 / 0.5588)),
+        Push("inner_link", 0.3, (0.0, 9.0, 2.0), 0.1, 0.4),
         "disable",
     )
 

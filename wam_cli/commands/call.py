@@ -233,8 +233,8 @@ def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrenc
     if not low <= at <= high:
         raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
     x, y, z = given.force
-    on_axis = Push(given.cover, at, (x, y, z), 0.0, given.seconds, covers.aside(given.cover, at))
-    wrench = Wrench(given.cover, on_axis.force, on_axis.torque)
+    push = Push(given.cover, at, (x, y, z), 0.0, given.seconds)
+    wrench = Wrench(given.cover, push.force, push.torque(covers))
     if excess := shared.push_excess(wrench.force, wrench.torque):
         raise ValueError(excess)
     return wrench, at, shared

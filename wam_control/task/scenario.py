@@ -26,7 +26,7 @@ from wam_control.task.scenario_values import (
 from wam_control.task.task_text import as_of_file, require_task, task_of_text, torque_task
 from wam_control.thresholds import MOTION
 from wam_description import yaml_text
-from wam_description.arm import Arm, Shared
+from wam_description.arm import Arm, Covers, Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import RigidBody
@@ -81,12 +81,10 @@ class Push(NamedTuple):
     force: tuple[float, float, float]  # N, in the cover's frame
     begin: float  # s
     end: float  # s
-    aside: tuple[float, float] | None = None  # m, y and z where it acts, within the tube; on its axis by default
 
-    @property
-    def torque(self) -> Triple:
-        """About the origin of the cover, N m."""
-        x, y, z = self.position, *(self.aside or (0.0, 0.0))
+    def torque(self, covers: Covers | None) -> Triple:
+        """About the origin of the cover, N m; where no covers are known, the tube's axis is the x axis of its frame."""
+        x, (y, z) = self.position, covers.aside(self.cover, self.position) if covers else (0.0, 0.0)
         fx, fy, fz = self.force
         return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
@@ -198,6 +196,7 @@ class Scenario:
         if shared is not None:
             steps = [_checked(f"step {i + 1}", step, shared, controllers) for i, step in enumerate(steps)]
         self.steps, self._shared = list(steps), shared
+        self._covers = shared.arm.covers if shared else None
         self._motion: Motion | None = None
         self._rate: tuple[float, ...] = ()
         self._index = -1
@@ -236,7 +235,7 @@ class Scenario:
             force=NO_FORCE if self.done else self._force(step),
             push_cover=push.cover if push else "",
             push_force=push.force if push and pushing else ZERO,
-            push_torque=push.torque if push and pushing else ZERO,
+            push_torque=push.torque(self._covers) if push and pushing else ZERO,
             request=request if begins else "",
             settings=step.settings if begins and not self.done else (),
             step=step.name,
@@ -536,10 +535,8 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
 def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any] = NONE) -> ScenarioStep:
     """A step of a file or made in Python, as it is played."""
     _require_step(where, step, shared)
-    push, task, settings = step.push, step.task, checked_settings(where, step.settings, shared, controllers)
-    if push and not push.aside:
-        push = push._replace(aside=shared.arm.covers.aside(push.cover, push.position))
-    whole: ScenarioStep = plain(step._replace(push=push, task=None, settings=()))
+    task, settings = step.task, checked_settings(where, step.settings, shared, controllers)
+    whole: ScenarioStep = plain(step._replace(task=None, settings=()))
     return whole._replace(task=task and as_of_file(task), settings=settings)
 
 
@@ -677,25 +674,11 @@ def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> Non
         f"{where}: contact_position is {place:g} m; {push.cover} reaches from 0 to {length:g} m",
     )
     numbers(where, "newtons", push.force, 3)
-    if push.aside is not None:
-        _require_within_tube(where, push, shared.arm)
     begin, end = number(where, "begin", push.begin), number(where, "end", push.end)
     require(
         0.0 <= begin < end <= seconds + MOTION.rounding,
         f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
         f"{seconds:g} s of the step; a push ends with its step: to continue it, give it again in the next step",
     )
-    excess = shared.push_excess(push.force, push.torque)
+    excess = shared.push_excess(push.force, push.torque(covers))
     require(not excess, f"{where}: push: {excess}")
-
-
-def _require_within_tube(where: str, push: Push, arm: Arm) -> None:
-    """Refuse a push outside the tube, where nothing can touch it."""
-    y, z = numbers(where, "aside", push.aside, 2)
-    at_y, at_z = arm.covers.aside(push.cover, push.position)
-    radius = arm.covers.radius_of(push.cover)
-    require(
-        math.hypot(y - at_y, z - at_z) <= radius + MOTION.rounding,
-        f"{where}: aside is ({y:g}, {z:g}) m; allowed: up to the radius of {push.cover}, {radius:g} m, from its axis, "
-        f"({at_y:.4g}, {at_z:.4g}) m; leave it out for the axis",
-    )

@@ -197,7 +197,7 @@ class ScenarioGenerator:
         cover, position = contact.cover, contact.position
         force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
         begin, end = contact.begin - step_begins, contact.end - step_begins
-        return Push(cover, position, force, begin, end, self._arm.covers.aside(cover, position))
+        return Push(cover, position, force, begin, end)
 
     def _values(
         self, random: np.random.Generator, start: Sequence[float], planned: list[PlannedContact]
