@@ -14,7 +14,7 @@ from wam_description.event import fault
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import lengths, parameter, require, rows
-from wam_description.signals import BASE, NO_LOAD, Answer, Load, Point, State, Table, Wrench
+from wam_description.signals import BASE, NO_LOAD, ZERO, Answer, Load, Point, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
@@ -264,7 +264,7 @@ class Driver:
         """
         if excess := self._push_excess(force, torque):
             raise ValueError(f"{excess}; the last push remains")
-        self.plant.push(cover, np.array(force), np.array(torque))
+        self.plant.push(cover, force, torque)
         self._push_ends[cover] = self._tick + self._push_ticks
 
     def disturb(self, wrench: Wrench) -> None:
@@ -288,7 +288,7 @@ class Driver:
 
     def _end_push(self, cover: str) -> None:
         self._push_ends.pop(cover, None)
-        self.plant.push(cover, np.zeros(3), np.zeros(3))
+        self.plant.push(cover, ZERO, ZERO)
 
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""

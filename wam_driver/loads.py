@@ -15,6 +15,7 @@ from mujoco import mj_applyFT
 from wam_description.arm import Arm
 from wam_description.contact_pairs import folded
 from wam_description.signals import Load
+from wam_description.small_matrices import cross
 from wam_description.world import Springs
 from wam_driver.thresholds import PLANT
 
@@ -83,7 +84,7 @@ class CoverLoads:
         self._turned = turned[:3], turned[3:]  # force and torque of a push in the base frame
         self._turn = partial(Struct("6d").pack_into, turned.data, 0)
 
-    def push(self, cover: str, force: np.ndarray, torque: np.ndarray) -> None:
+    def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
         """Push on a cover, see `Plant.push`."""
         if cover not in self._origin:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
@@ -181,7 +182,7 @@ class CoverLoads:
                     rotation = self._rotation[cover]
                     force = rotation.T @ (sign * contact_force(self._model, data, i, self._wrench))
                     at = rotation.T @ (data.contact.pos[i] - self._origin[cover])
-                    yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
+                    yield cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
         for cover, push in self.pushes.items():
@@ -196,7 +197,7 @@ class CoverLoads:
                 rotation = self._rotation[cover]
                 force = rotation.T @ across * (squeeze * float(self._model.tendon_stiffness[tendon]))
                 at = rotation.T @ (data.xpos[body] + lever * along - self._origin[cover])
-                yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
+                yield cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
 
 
 def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:

@@ -206,7 +206,7 @@ class Plant:
         self._is_set = self._is_set and on == self._braked
         self._braked = on
 
-    def push(self, cover: str, force: np.ndarray, torque: np.ndarray) -> None:
+    def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
         """Push on a cover until the next push on it or `release`.
 
         Parameters

@@ -108,7 +108,7 @@ class _Kept:
     is_framed : whether messages have a frame.
     """
 
-    __slots__ = ("_block", "_blocks", "_count", "_end", "_frame", "_is_framed", "_layout", "_pack", "_row")
+    __slots__ = ("_block", "_blocks", "_count", "_end", "_frame", "_is_framed", "_layout", "_pack", "_row", "_size")
 
     def __init__(self, row: Callable[[int, Any], _Row], is_framed: bool) -> None:
         self._row, self._is_framed = row, is_framed
@@ -123,16 +123,16 @@ class _Kept:
             self._close()
             self._count, self._frame = len(row), value.frame if self._is_framed else ""
             self._layout = Struct(f"q{self._count - 1}d")
-            self._pack = self._layout.pack_into
+            self._pack, self._size = self._layout.pack_into, self._layout.size
             self._begin(SMALLEST_BLOCK)
         elif self._end == len(self._block):
-            self._begin(min(2 * len(self._block) // self._layout.size, LARGEST_BLOCK))
+            self._begin(min(2 * len(self._block) // self._size, LARGEST_BLOCK))
         self._pack(self._block, self._end, *row)
-        self._end += self._layout.size
+        self._end += self._size
 
     def _begin(self, messages: int) -> None:
         """Begin a block of so many messages."""
-        self._block, self._end = bytearray(messages * self._layout.size), 0
+        self._block, self._end = bytearray(messages * self._size), 0
         self._blocks.append((self._frame, self._layout, self._block))
 
     def _close(self) -> None:

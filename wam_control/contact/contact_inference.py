@@ -22,7 +22,7 @@ from wam_description.parameters import aligned, require, rows
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ZERO
-from wam_description.small_matrices import inverse
+from wam_description.small_matrices import cross, inverse
 from wam_description.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -206,7 +206,7 @@ class ContactInference:
             is_lower_bound=is_unknown,
             direction=math.atan2(f2, f1),
             direction_sd=fit.direction_sd,
-            moment=_cross(point, force),
+            moment=cross(point, force),
             residual=residual,
             reasons=reasons,
         )
@@ -253,10 +253,6 @@ class ContactInference:
 
 def _triple(values: Sequence[float]) -> Triple:
     return values[0], values[1], values[2]
-
-
-def _cross(a: Triple, b: Triple) -> Triple:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:

@@ -101,7 +101,7 @@ class ErrorEffects:
         has_dither: bool,
         links: LinkEffects,
     ) -> None:
-        inverse, friction = side.map.motor_from_joint, side.friction
+        self._side, inverse, friction = side, side.map.motor_from_joint, side.friction
         n = self._n = len(inverse)
         self._from_motors, self._parameters, self._times = side.map.joint_from_motor, parameters, times
         self._sds = parameters.rest_uncertainty * friction.static, parameters.shape_uncertainty * friction.static
@@ -115,16 +115,13 @@ class ErrorEffects:
         self._differs = np.eye(n) - common / np.maximum(1.0, common.sum(axis=1))
         self._to_joints, self._has_dither, self._links = inverse.T, has_dither, links
 
-    def observation(
-        self, motion: FilteredMotion, inertia: Array, velocity_sd: Sequence[float], which: int
-    ) -> Observation:
+    def observation(self, motion: FilteredMotion, inertia: Array, which: int) -> Observation:
         """The residual, the effects of the errors on it, and the covariance of the rest.
 
         Parameters
         ----------
         motion : with the signals of the shafts.
         inertia : (n, n), kg m^2.
-        velocity_sd : of the motors' velocities, (n,), rad/s.
         which : of the filters.
         """
         n, given, time = self._n, self._parameters, self._times[which]
@@ -161,6 +158,6 @@ class ErrorEffects:
         lasting = self._through * np.sqrt(variance)
         less = self._times[0] / time  # a faster filter averages less of what is noise
         variance[:n] += less * (given.motor_torque_sd**2 + np.square(given.motor_torque_fraction * modelled))
-        momentum = inertia.dot(self._from_motors * (np.array(velocity_sd) / time))
+        momentum = inertia.dot(self._from_motors * (np.array(self._side.velocity_sd) / time))
         rest = (self._through * variance).dot(self._through.T) + momentum.dot(momentum.T)
         return Observation(residual, effects, rest, less * moving[:n], motion.pose, lasting)

@@ -246,8 +246,7 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        motion, velocity_sd = self._filters.motion(which), self._side.velocity_sd
-        return self._effects.observation(motion, self._last.inertia, velocity_sd, which)
+        return self._effects.observation(self._filters.motion(which), self._last.inertia, which)
 
     def zero(self) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.

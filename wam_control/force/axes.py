@@ -99,7 +99,8 @@ class TaskAxes:
             PressedForce(place.cover, place.position, place.position_sd, direction, _size(axis))
             for axis, place, direction in zip(task.axes, places, directions, strict=True)
         ]
-        torques = [self._disturbance(q, *one) for one in zip(task.axes, pressed, strict=True)]
+        is_alone = len(pressed) == 1
+        torques = [[] if is_alone else self._disturbance(q, *one) for one in zip(task.axes, pressed, strict=True)]
         return [
             self._axis(q, i, task.axes, directions[i], in_frame[i], pressed[i], torques, places[i])
             for i in range(len(task.axes))

@@ -18,7 +18,7 @@ from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Servo
 from wam_description.parameters import parameter
 from wam_description.rigid_body import RigidBody
-from wam_description.small_matrices import inverse
+from wam_description.small_matrices import inverse, length, outer
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ class ForceAxis(NamedTuple):
 
     def error(self, torque_sd: Array | float) -> float:
         """Standard deviation of the force, N, by those of the torques (n,), or of each of them, N m."""
-        return float(np.linalg.norm(self.sense * torque_sd))
+        return length(self.sense * torque_sd)
 
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
@@ -252,7 +252,7 @@ class ForceAxes:
         along = self.link_axis(q, cover)
         aside = along * float(along @ direction)
         across: Array = direction - aside
-        size, most = float(np.linalg.norm(across)), self._parameters.friction
+        size, most = length(across), self._parameters.friction
         slope = math.sqrt(max(1.0 - size * size, 0.0)) / max(size, FORCE.least_normal)
         if slope <= most or size < FORCE.least_normal:
             return direction
@@ -280,10 +280,10 @@ class ForceAxes:
                 lever, zero, zero, zero, math.inf, 0.0, 0.0, zero, math.inf, math.inf, 0.0, 0.0, none, none
             )
         size = max(force, FORCE.sized_force)
-        length = self.covers.length_of(cover)
         aside = self._push(q, cover, direction)
+        end = self.covers.length_of(cover) - self.covers.radius_of(cover)
         # the end of a link is round, and other forces at the same position press the surface as well
-        is_side = position + 2.0 * position_sd < length - self.covers.radius_of(cover) and not others
+        is_side = position + 2.0 * position_sd < end and not others
         push = aside if is_side else direction
         friction = parameters.friction * size * _across(direction, push)
         tangential = friction @ jacobian
@@ -291,9 +291,9 @@ class ForceAxes:
         press: Array = push @ jacobian
         shift = push @ slide * size
         shifted = friction @ slide  # friction at another position has another lever
-        moved = np.outer(shift, shift) + shifted.T @ shifted
+        moved = outer(shift, shift) + shifted.T @ shifted
         spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
-        across = np.vstack([tangential, *others])
+        across = np.vstack([tangential, *others]) if others else tangential
         spread += across.T @ across
         moved *= position_sd**2
         weight = inverse(spread + moved)
@@ -306,7 +306,7 @@ class ForceAxes:
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        friction_sd = float(np.linalg.norm(across @ sense))
+        friction_sd = length(across @ sense)
         place_sd = math.sqrt(float(sense @ moved @ sense))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(
@@ -368,6 +368,6 @@ def _unexplained(precision: Array, press: Array, torques: Array) -> float:
 def _across(direction: Array, push: Array) -> Array:
     """Rows (3, 3) of forces across a push that leave its part along the direction as it is, each as large as 1 N/N."""
     square = float(push @ push)
-    across = math.sqrt(square) * (np.eye(3) - np.outer(push, push) / square)
-    result: Array = across - np.outer(across @ direction, push)
+    across = math.sqrt(square) * (np.eye(3) - outer(push, push) / square)
+    result: Array = across - outer(across @ direction, push)
     return result

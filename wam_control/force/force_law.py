@@ -9,6 +9,7 @@ point: a step of the set point moves the arm through G_I alone, without a jerk.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from wam_control.force.thresholds import FORCE
 from wam_description.parameters import require
@@ -82,28 +83,33 @@ class ForceLaw:
 
         Saturated axis by axis, an error along a diagonal could be sqrt(3) times as large.
         """
-        squares = [part * part for part in axis]
+        return _along(self, tuple(axis))
 
-        def mean(values: Sequence[float]) -> float:
-            return sum(a * b for a, b in zip(squares, values, strict=True))
 
-        def radius(values: Sequence[float]) -> float:
-            used = [(square, value) for square, value in zip(squares, values, strict=True) if square > FORCE.negligible]
-            if not all(value for _, value in used):
-                return 0.0
-            first = used[0][1]
-            if all(value == first for _, value in used):
-                return first
-            return math.sqrt(sum(square for square, _ in used) / sum(a / (b * b) for a, b in used))
+@lru_cache  # the same in every period of a command
+def _along(law: ForceLaw, axis: tuple[float, ...]) -> ForceLaw:
+    squares = [part * part for part in axis]
 
-        return ForceLaw(
-            self.group,
-            ("along",),
-            (mean(self.gain),),
-            (mean(self.proportional_gain),),
-            (radius(self.error_limit),),
-            (radius(self.deadband),),
-        )
+    def mean(values: Sequence[float]) -> float:
+        return sum(a * b for a, b in zip(squares, values, strict=True))
+
+    def radius(values: Sequence[float]) -> float:
+        used = [(square, value) for square, value in zip(squares, values, strict=True) if square > FORCE.negligible]
+        if not all(value for _, value in used):
+            return 0.0
+        first = used[0][1]
+        if all(value == first for _, value in used):
+            return first
+        return math.sqrt(sum(square for square, _ in used) / sum(a / (b * b) for a, b in used))
+
+    return ForceLaw(
+        law.group,
+        ("along",),
+        (mean(law.gain),),
+        (mean(law.proportional_gain),),
+        (radius(law.error_limit),),
+        (radius(law.deadband),),
+    )
 
 
 def per_axis(field: str, given: Sequence[float], names: Sequence[str]) -> tuple[float, ...]:

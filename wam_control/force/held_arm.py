@@ -15,6 +15,7 @@ from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
+from wam_description.small_matrices import length
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,7 @@ class PushedArm:
         tool = self._body.tool_pose(q).position
         if is_new or self._from is None:
             self._from = tool
-        if float(np.linalg.norm(tool - self._from)) > own.limits.free_travel:
+        if length(tool - self._from) > own.limits.free_travel:
             return []
         return [push.row(allowed, gain, own.joint_speed_limit) for push in pushes]
 

@@ -14,6 +14,7 @@ from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
 from wam_description.rigid_body import RigidBody
+from wam_description.small_matrices import length
 
 Array = NDArray[np.float64]
 
@@ -119,7 +120,7 @@ def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> f
 
 def certain_size(torques: Array, torque_sd: Array) -> float:
     """Size of torques (n,), N m, less what is uncertain of it by their standard deviations (n,), N m."""
-    return max(math.sqrt(torques.dot(torques)) - FORCE.certain * math.sqrt(torque_sd.dot(torque_sd)), 0.0)
+    return max(length(torques) - FORCE.certain * length(torque_sd), 0.0)
 
 
 class WorldPush(NamedTuple):
@@ -144,7 +145,7 @@ class WorldPush(NamedTuple):
 
     def row(self, allowed: float, gain: float, fastest: float) -> VelocityRow:
         """No faster against it than a force law, m/s/N, allows up to this force, N; above it away from it."""
-        along = self.torques / math.sqrt(self.torques.dot(self.torques))
+        along = self.torques / length(self.torques)
         return VelocityRow(along, min(gain * (self.least - allowed) / self.lever, fastest))
 
 
@@ -176,7 +177,7 @@ def followed(
     assert axis.place is not None
     assert axis.sensed is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
-    slide = FORCE.slide_slope * float(np.linalg.norm(body.point_jacobian(q, axis.place.cover, point) @ posture))
+    slide = FORCE.slide_slope * length(body.point_jacobian(q, axis.place.cover, point) @ posture)
     pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(latency(own), FORCE.negligible))
     most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)
     return posture * (most / slide) if slide > most else posture

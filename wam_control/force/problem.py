@@ -7,7 +7,6 @@ posture.  The bounds always hold, so there is always a solution.  W puts the row
 contradict each other share what is left.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -16,7 +15,7 @@ import quadprog
 from numpy.typing import NDArray
 
 from wam_control.force.thresholds import FORCE
-from wam_description.small_matrices import inverse
+from wam_description.small_matrices import inverse, length, outer
 
 Array = NDArray[np.float64]
 RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
@@ -37,7 +36,7 @@ class VelocityRow(NamedTuple):
     @property
     def size(self) -> float:
         """Length of `along`."""
-        return math.sqrt(self.along.dot(self.along))
+        return length(self.along)
 
 
 class Solution(NamedTuple):
@@ -99,7 +98,7 @@ def _normal(rows: Sequence[VelocityRow], posture: Array) -> tuple[Array, Array]:
     matrix, right = np.eye(len(posture)), posture
     for along, speed in rows:
         weighted = along * (RANK / along.dot(along))
-        matrix = matrix + np.outer(weighted, along)
+        matrix = matrix + outer(weighted, along)
         right = right + speed * weighted
     return matrix, right
 

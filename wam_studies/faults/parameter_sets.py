@@ -9,13 +9,13 @@ from functools import partial
 from random import Random
 from typing import Any, Final, NamedTuple
 
-import numpy as np
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 
 from wam_description.arm import Shared
 from wam_description.interface import declared
 from wam_description.parameters import Field, fields
+from wam_description.signals import ZERO
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
@@ -195,7 +195,7 @@ def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
 def _push(stack: WatchedStack) -> None:
     """A small push: with parameters that are accepted the arm stays slow and enabled."""
     plant = stack.driver.plant
-    plant.push(stack.cover, np.array([0.0, FAULTS.push, 0.0]), np.zeros(3))
+    plant.push(stack.cover, (0.0, FAULTS.push, 0.0), ZERO)
     stack.run(FAULTS.pushed)
     plant.release()
     stack.run(FAULTS.settling)

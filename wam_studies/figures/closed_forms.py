@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from wam_description.arm import Arm
+from wam_description.signals import ZERO
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
 from wam_studies.figures.transmissions import driven, efficiency
@@ -142,7 +143,7 @@ def static_stiffness(arm: Arm, torque: float = 5.0) -> float:
     damping = 2.0 * link_inertia(arm) * 40.0
     arm = replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
     plant = released_plant(arm)
-    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    plant.push("link", ZERO, (0.0, 0.0, torque))
     plant.step([0.0], round(CASE.speed_change / STEP))
     while abs(plant.qd[0]) > 1e-7:
         plant.step([0.0])

@@ -6,6 +6,7 @@ their zeta and k_tr = k_c; the plant is the testbed with a contact and a damping
 
 import numpy as np
 
+from wam_description.signals import ZERO
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
 from wam_studies.plant.ideal_testbed import RATIO, force_step, loop_arm, loop_node, loop_plant
@@ -66,7 +67,7 @@ def closed_loop_map(node: FrictionNode, gain: float) -> tuple[Numbers, Numbers]:
     def after(state: Numbers, torque: float) -> Numbers:
         plant.data.qpos[:] = RATIO * state[0], state[1]
         plant.data.qvel[:] = -RATIO * gain * node.contact_stiffness * state[1], state[2]
-        plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.push("link", ZERO, (0.0, 0.0, torque))
         plant.step([0.0])
         return np.array([plant.theta[0] / RATIO, plant.q[0], plant.qd[0]])
 

@@ -12,6 +12,7 @@ from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects, no_effects
+from wam_description.signals import ZERO
 from wam_description.world import World
 from wam_driver.driver import DriverParameters
 from wam_driver.friction import FrictionParameters
@@ -151,7 +152,7 @@ def _deflection(it: Driven, torque: float) -> float:
     """Of the link under a torque, rad, the motor held: the mean over a period of its undamped oscillation."""
     plant = it.smooth.plant(rotor=IMMOVABLE)
     plant.data.qpos[1] = 0.5 * it.effects.play(0) / it.ratio  # the gap is closed at the start
-    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    plant.push("link", ZERO, (0.0, 0.0, torque))
     period = 2.0 * math.pi * math.sqrt(link_inertia(it.arm) / it.stiffness)
     angles = []
     for _ in range(round(period / it.step)):
@@ -168,7 +169,7 @@ def bandwidth(it: Driven, contact: float) -> float:
 def efficiency(it: Driven, load: float) -> float:
     """Work on a load at the joint, N m, over work of the motor, in slow motion."""
     plant = it.plant(rotor=IMMOVABLE, damping=0.02)
-    plant.push("link", np.zeros(3), np.array([0.0, 0.0, -load]))
+    plant.push("link", ZERO, (0.0, 0.0, -load))
     carried = load / (1.0 - it.friction.joint_load_factor[0])
     plant.data.qpos[1] = -(carried / it.stiffness + 0.5 * it.effects.play(0) / it.ratio)
     plant.data.qvel[:] = (it.ratio * CASE.speed_under_load, CASE.speed_under_load)
@@ -180,7 +181,7 @@ def efficiency(it: Driven, load: float) -> float:
 def _inertia(it: Driven, torque: float = 5.0, seconds: float = 2.0) -> float:
     """Torque on the link over its acceleration, kg m^2, without friction and play."""
     plant = it.smooth.plant(play=False)
-    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    plant.push("link", ZERO, (0.0, 0.0, torque))
     plant.step([0.0], round(seconds / it.step))
     return torque * seconds / (plant.thetad[0] / it.ratio)
 
@@ -190,7 +191,7 @@ def _breakaway(it: Driven, rate: float = 0.2) -> float:
     plant, torque = it.plant(dry=True, play=False), 0.0
     while abs(plant.thetad[0]) < 1e-4 * it.ratio:
         torque += rate * it.step
-        plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.push("link", ZERO, (0.0, 0.0, torque))
         plant.step([0.0])
     return torque
 
