@@ -370,6 +370,7 @@ class Shared:
         )
         self.arm.links.require_bodies()
         aligned("motion", self.arm.joints.names, self.motion)
+        aligned("servo", self.arm.motors.names, self.servo)
 
     @property
     def is_simulated(self) -> bool:

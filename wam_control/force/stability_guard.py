@@ -179,7 +179,6 @@ class StabilityGuard:
         self, arm: Arm, servo: Servo, timing: Timing, parameters: GuardParameters, sensing: SensingParameters
     ) -> None:
         lengths("guard", arm.joints.names, {"posture": parameters.posture})
-        lengths("servo", arm.motors.names, vars(servo))
         self.parameters = parameters
         self._arm, self._timing = arm, timing
         self._loop = SampledLoop(arm, timing, servo)

@@ -10,7 +10,7 @@ import yaml
 
 from wam_control.force.contact_place import torque_of_position
 from wam_control.force.task import AxisKind, TaskCommand
-from wam_control.task.motion import FASTEST, GoalMotion, LineMotion, PostureMotion
+from wam_control.task.motion import GoalMotion, LineMotion, PostureMotion
 from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
 from wam_control.task.scenario_values import (
     frame,
@@ -323,7 +323,7 @@ def motion_of(
                 f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}: "
                 "give the step more time",
             )
-            _require_speed(step, motion, start, shared, followed)
+            _require_speed(step, motion, shared, followed)
     except ParameterError as error:
         raise ParameterError(f"step '{step.name}': {error}") from None
     return motion
@@ -342,7 +342,7 @@ def _planned(step: ScenarioStep, start: Sequence[float], shared: Shared | None) 
     return LineMotion(start, step.tip, shared.arm, RigidBody(shared.arm), shared.motion)
 
 
-def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], shared: Shared, followed: float) -> None:
+def _require_speed(step: ScenarioStep, motion: Motion, shared: Shared, followed: float) -> None:
     """Refuse a motion at which the driver would stop the arm, or with which the force loop would not keep up."""
     joints, allowed = shared.arm.joints, MOTION.caught_up if step.posture else 1.0
     loop = allowed * followed, (f"{allowed:g} times " if allowed > 1.0 else "") + f"{FORCE_LOOP}:{FOLLOWED}"
@@ -353,17 +353,15 @@ def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], s
     excess, k, most, limit = max(found)
     if excess <= 1.0 + MOTION.rounding:
         return
-    what, advice = "turns", f"lower motion.joint_speed to {most:g} rad/s"
-    if step.posture:
-        what = f"goes from {round(start[k], 6) + 0.0:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
-        least = FASTEST * abs(step.posture[k] - start[k]) / most if most else 0.0
-        advice = f"give the step at least {math.ceil(1e3 * (least - MOTION.rounding)) / 1e3:g} s"
+    advice = f"lower motion.joint_speed to {most:g} rad/s"
+    if step.posture and most:
+        advice = f"give the step at least {math.ceil(1e3 * (excess * step.seconds - MOTION.rounding)) / 1e3:g} s"
         if followed == math.inf:
             advice += f", more where {FORCE_LOOP}:{FOLLOWED} is lower"
     elif step.trajectory is not None and any(point.time for point in step.trajectory.points):
         advice = f"give it {excess:.3g} times the time, or no times and {advice}"
     raise ParameterError(
-        f"{joints.names[k]} {what} at up to {motion.fastest[k]:.3g} rad/s; allowed: up to {limit}, {most:g} rad/s; "
+        f"{joints.names[k]} turns at up to {motion.fastest[k]:.3g} rad/s; allowed: up to {limit}, {most:g} rad/s; "
         + (advice if most else "raise it")
     )
 

@@ -7,9 +7,8 @@ from typing import Any, Final, NamedTuple
 from wam_control.task.scenario_values import known, require_list
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
-from wam_description.interface import declared
+from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, build, checked, fields, given_once, meant, require
-from wam_description.wiring import declaration
 
 NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
@@ -99,11 +98,8 @@ def require_settings(
 
 
 def _parameter_class(where: str, node: str, shared: Shared, controllers: Mapping[str, Any]) -> Any:
-    """Of the node of this name: that of the package, or one of your own, 'module:Class'."""
-    if node in controllers:
-        return declaration(controllers[node]).parameter_class
-    entries = [node] if node in shared.nodes else [entry for entry in shared.nodes if ":" in entry]
-    for entry in entries:
-        if (found := declared(entry)).name == node:
-            return found.parameter_class
-    raise ParameterError(f"{where}: set, {node}: no node is named so; nodes: {', '.join(shared.nodes)}")
+    """Of the node of this name: that of the package, or one of your own."""
+    found = Interface(shared, dict(controllers)).declarations.get(node)
+    if found is None:
+        raise ParameterError(f"{where}: set, {node}: no node is named so; nodes: {', '.join(shared.nodes)}")
+    return found.parameter_class

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wam_control.force.sampled_loop import Feedback, SampledLoop
 from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.parameters import ParameterError, aligned, parameter, require
+from wam_description.parameters import ParameterError, parameter, require
 from wam_description.transmission_map import TransmissionMap
 from wam_theory.rounding import rounded_down, rounded_up
 from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
@@ -75,7 +75,6 @@ class ServoGuard:
         ParameterError
             names the gains, their limit and the smallest or largest that would be taken.
         """
-        aligned("servo", self._arm.motors.names, servo)
         if self._parameters.mode == "off":
             return
         self._require_holding(servo)

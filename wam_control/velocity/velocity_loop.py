@@ -9,7 +9,7 @@ from wam_control.thresholds import VELOCITY
 from wam_control.velocity.dither import DitherParameters
 from wam_control.velocity.servo_guard import ServoGuardParameters
 from wam_description.arm import Servo
-from wam_description.parameters import aligned, parameter
+from wam_description.parameters import parameter
 from wam_description.parts import Motors
 from wam_description.wiring import Input, reaction
 
@@ -43,7 +43,6 @@ class VelocityLoop:
         self._limits = list(zip(motors.peak_torque, motors.torque_constant, strict=True))
         n = len(self._limits)
         self._integral, self._commanded, self._velocity, self._feedforward = ([0.0] * n for _ in range(4))
-        aligned("servo", motors.names, servo)
         self._kp, self._ki = servo.proportional_gain, servo.integral_gain
         self._acceleration, self._torque_rate = parameters.acceleration_limit, parameters.torque_rate_limit
 
