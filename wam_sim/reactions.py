@@ -12,7 +12,7 @@ from wam_description.event_text import sentence
 SETTLING_TIME = "limits.settling_time"
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
 REFUSAL = str(Code.REFUSED)
-IN_DOUBT = "applied, but in doubt"  # a force that would be refused, had the arm not pressed with it already
+IN_DOUBT = "applied, but perhaps wrong"  # a force that would be refused, had the arm not pressed with it already
 OUTCOMES = (REFUSAL, TOO_MUCH, UNREACHED)  # of a command that is not met
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
 STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none

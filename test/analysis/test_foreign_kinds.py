@@ -187,7 +187,7 @@ def called_as_commands() -> list[Case]:
 def few_cycles() -> list[Case]:
     return [
         Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
-             ("No frequency above",))
+             ("No vibration above",))
         for write, rate, frequency, seconds in (
             (by_rosbags, 250.0, 0.4, 10.0), (sqlite, 100.0, 0.1, 30.0), (ros1, 50.0, 0.03, 100.0),
         )
@@ -224,7 +224,15 @@ def brief_rests() -> list[Case]:
         way = np.where(np.arange(len(phase)) * faster / rate % 2.8 < 1.4, 1.0, -1.0)
         position = 0.3 * way * np.cos(math.pi * np.minimum(phase, 1.0))
         sent = joints("/joint_states", np.arange(len(phase)) / rate, ["a"], position=position[:, None])
-        return Case(f"{faster:g}", write, sent, {}, "", NOTHING, (f"a: never at rest for {told} s or more.",))
+        return Case(
+            f"{faster:g}",
+            write,
+            sent,
+            {},
+            "",
+            NOTHING,
+            (f"a: always in motion; a rest shorter than {told} s does not count.",),
+        )
 
     return [resting(by_rosbags, 100.0, 1.0, "0.505"), resting(sqlite, 1000.0, 10.0, "0.0505")]
 

@@ -207,6 +207,7 @@ def arm_of(bag: Bag) -> RecordedArm:
         (7.0, 7.0, "base", 0.0, (4.2, 5.0, 4.0, 3.92)),  # not the 20 N of the begin, nor the friction along the link
         (7.0, 9.0, "outer_link", -4.0, (-4.0, -200.0, 4.0, 3.92)),  # pulls
         (8.0, 9.0, "base", 0.0, (0.0, -100.0, 4.0, 3.92)),  # a lost contact is no force
+        (7.0, 9.0, "base", 0.0, (0.0, -100.0, 4.0, 3.92)),  # nor is one that never was
         (8.0, 9.0, "inner_link", 4.0, (math.nan, math.nan, 4.0, 3.92)),  # another link is not compared
     ],
 )
@@ -216,6 +217,10 @@ def test_a_force_is_measured_in_its_steady_state_along_the_commanded_one(begin, 
     found = forces_of(recording)
     names = ("true force", "error of the true force", "measured force", "estimated force")
     assert [found[f"press 4 N: {name}"] for name in names] == pytest.approx(expected, nan_ok=True)
+    free = (begin, end, force) == (7.0, 9.0, 0.0)
+    assert (
+        "Forces: 1 of 2 applied, largest error +5.0 %; nothing was touched: press 4 N." in told(recording.bag())
+    ) == free
 
 
 def test_a_force_that_swings_is_not_right_because_its_mean_is():

@@ -13,7 +13,7 @@ from wam_analysis.measures.force_accuracy import ForceAccuracy
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
-from wam_control.force.thresholds import GUARD
+from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.event import Code
 from wam_description.signals import BASE
 from wam_sim.reactions import IN_DOUBT, STEADY, RecordedReaction, of_force_loop, within
@@ -58,12 +58,13 @@ def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedRe
 
 def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int) -> list[str]:
     """What was refused, and what was reported of others, in a sentence each."""
-    alike: dict[str, dict[tuple[str, Code], str]] = {what: {} for what in (NOT_APPLIED, stated(IN_DOUBT)[:-1], ELSE)}
+    doubtful = stated(IN_DOUBT)[:-1]
+    alike: dict[str, dict[tuple[str, Code], str]] = {what: {} for what in (NOT_APPLIED, doubtful, ELSE)}
     for name, reactions in found.items():
         for one in reactions:
-            what = ELSE if one.name is not Code.REFUSED else stated(IN_DOUBT)[:-1]
-            text = f"{name} ({one.name.words} at {(one.begin - zero) / 1e9:.2f} s)"
-            alike[NOT_APPLIED if one.holds else what].setdefault((name, one.name), text)
+            what = NOT_APPLIED if one.holds else doubtful if one.name is Code.REFUSED else ELSE
+            event = "from" if what is doubtful else f"{one.name.words} at"
+            alike[what].setdefault((name, one.name), f"{name} ({event} {(one.begin - zero) / 1e9:.2f} s)")
     return [f"{what}: {'; '.join(named.values())}." for what, named in alike.items() if named]
 
 
@@ -73,10 +74,20 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     known = [(one, accuracy.bias) for one in held if math.isfinite((accuracy := _accuracy(one)).bias)]
     if not known:
         return ()
-    worst, bias = max(known, key=lambda item: abs(item[1]) / item[0].hold.commanded)
-    whose = "" if len(worst.true) else "measured "
-    error = 100.0 * bias / worst.hold.commanded
-    return (f"Forces: {len(known)} of {len(held)} applied, largest {whose}error {error:+.1f} %.",)
+    applied = [(one, bias) for one, bias in known if _has_touched(one)]
+    free = ", ".join(one.hold.name for one, _ in known if not _has_touched(one))
+    text = f"Forces: {len(applied)} of {len(held)} applied"
+    if applied:
+        worst, bias = max(applied, key=lambda item: abs(item[1]) / item[0].hold.commanded)
+        whose = "" if len(worst.true) else "measured "
+        text += f", largest {whose}error {100.0 * bias / worst.hold.commanded:+.1f} %"
+    return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
+
+
+def _has_touched(one: HeldForce) -> bool:
+    """Whether there was a force at all: the true one, or the measured one if the true one was not recorded."""
+    force = np.abs(one.true if len(one.true) else one.measured)
+    return float(np.nanmax(force)) >= FORCE.touch * one.hold.commanded
 
 
 def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
@@ -117,7 +128,7 @@ def _press_sentence(one: HeldForce) -> str:
         return f"{text}; the resulting force was not recorded."
     remarks = [text]
     if response is not None and math.isfinite(response.rise):
-        remarks += [f"it {why}, so rise and overshoot are not evaluated" for why in [_impact(one)] if why]
+        remarks += [f"{why}, so rise time and overshoot are not evaluated" for why in [_impact(one)] if why]
         remarks += ["it did not settle to 5 %"] * math.isinf(response.settling)
     return "; ".join([*remarks, *["the arm was pushed meanwhile"] * hold.disturbed]) + "."
 
@@ -125,15 +136,15 @@ def _press_sentence(one: HeldForce) -> str:
 def _impact(one: HeldForce) -> str:
     """Why rise and overshoot of a press are not those of the control, '' where they are."""
     if one.before:
-        return f"began in a contact of {shown(one.before, 'N')}"
+        return f"it began while {shown(one.before, 'N')} acted already"
     return _touched(one) if math.isfinite(one.touched) else ""
 
 
 def _touched(one: HeldForce) -> str:
     """When a press touched down, and how hard."""
     peak = float(np.nanmax(one.true if len(one.true) else one.measured))
-    text = f"touched down {shown(abs(one.touched), 's')} {'into' if one.touched > 0.0 else 'before'} the step"
-    return f"{text if one.touched else 'touched down at the start of the step'} (up to {shown(peak, 'N')})"
+    text = f"it touched down {shown(abs(one.touched), 's')} {'into' if one.touched > 0.0 else 'before'} the step"
+    return f"{text if one.touched else 'it touched down at the start of the step'} (up to {shown(peak, 'N')})"
 
 
 def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:

@@ -97,8 +97,8 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
-    span = f"Slower than {least} is left out: fewer than five cycles in the longest part without a gap."
-    silent = [] if findings else [f"No frequency above {least} exceeds the noise."]
+    span = f"Below {least} nothing was looked for: the longest part without a gap has fewer than five such cycles."
+    silent = [] if findings else [f"No vibration above {least}: only noise."]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 

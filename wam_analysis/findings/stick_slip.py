@@ -69,7 +69,7 @@ class Sticking(NamedTuple):
         if not self.slips:
             return "never moved"
         if not self.stuck and self.slips == 1:
-            return f"never at rest for {shown(self.shortest, 's')} or more"
+            return f"always in motion; a rest shorter than {shown(self.shortest, 's')} does not count"
         return f"at rest for {100.0 * self.stuck:.0f} % of the time, moved {times(self.slips)}"
 
 
