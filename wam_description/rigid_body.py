@@ -94,7 +94,7 @@ class RigidBody:
         frame = self._known(cover)
         jacobians = _columns(pin.computeJointJacobians(self._model, self._data, _vector(q)))
         point = pin.updateFramePlacement(self._model, self._data, frame).act(_vector(p))
-        result: Array = jacobians[:3] - pin.skew(point) @ jacobians[3:]
+        result: Array = jacobians[:3] - pin.skew(point).dot(jacobians[3:])  # as in `momentum_bias`
         result[:, self._joint[cover] :] = 0.0
         return result
 

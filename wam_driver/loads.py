@@ -180,8 +180,8 @@ class CoverLoads:
                 if geom in self._cover_of_geom:
                     cover = self._cover_of_geom[geom]
                     rotation = self._rotation[cover]
-                    force = rotation.T @ (sign * contact_force(self._model, data, i, self._wrench))
-                    at = rotation.T @ (data.contact.pos[i] - self._origin[cover])
+                    force = rotation.T.dot(sign * contact_force(self._model, data, i, self._wrench))
+                    at = rotation.T.dot(data.contact.pos[i] - self._origin[cover])
                     yield cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
@@ -214,7 +214,7 @@ def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
 def contact_force(model: Any, data: Any, i: int, wrench: np.ndarray) -> np.ndarray:
     """Force of contact i on its second geom, (3,), N, in the base frame; `wrench` (6,) is overwritten."""
     mujoco.mj_contactForce(model, data, i, wrench)
-    force: np.ndarray = data.contact.frame[i].reshape(3, 3).T @ wrench[:3]
+    force: np.ndarray = data.contact.frame[i].reshape(3, 3).T.dot(wrench[:3])
     return force
 
 

@@ -60,7 +60,7 @@ class CommandedAxis(NamedTuple):
 
     def force(self, external: Array) -> float:
         """Force of the arm on the world along it, N or N m, from torques of the world on the joints (n,), N m."""
-        return -float((self.along if self.sensed is None else self.sensed.sense) @ external)
+        return -float((self.along if self.sensed is None else self.sensed.sense).dot(external))
 
 
 class TaskAxes:
@@ -94,7 +94,7 @@ class TaskAxes:
             for axis, side in zip(task.axes, sides, strict=True)
         ]
         in_frame = [sign * np.array(axis.direction) for axis, sign in zip(task.axes, signs, strict=True)]
-        directions = [rotation @ one for one in in_frame]
+        directions = [rotation.dot(one) for one in in_frame]
         pressed = [
             PressedForce(place.cover, place.position, place.position_sd, direction, _size(axis))
             for axis, place, direction in zip(task.axes, places, directions, strict=True)
@@ -130,9 +130,9 @@ class TaskAxes:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
             return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, q[axis.joint])
         point = np.array([place.position, *self._arm.covers.aside(place.cover, place.position)])
-        at = float(direction @ self._body.point(q, place.cover, point))
+        at = float(direction.dot(self._body.point(q, place.cover, point)))
         if not axis.is_sensed:
-            along: Array = direction @ self._body.point_jacobian(q, place.cover, point)
+            along: Array = direction.dot(self._body.point_jacobian(q, place.cover, point))
             return CommandedAxis(axis, along, direction, in_frame, 0.0, at)
         others: list[Array] = []
         for k, each in enumerate(torques):

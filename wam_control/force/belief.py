@@ -150,8 +150,8 @@ def belief(
         return Belief(force, before, sd, 0.0, errors, tolerance(size, own))
     if torques.acceleration is not None and not is_touching:
         # the acceleration is the mean of a period
-        force = before = 0.5 * (force + before) - float(sensed.carried @ torques.acceleration)
-    errors = predicted(axis, torques.sd, own, float(sensed.sense @ resting), shaking)
+        force = before = 0.5 * (force + before) - float(sensed.carried.dot(torques.acceleration))
+    errors = predicted(axis, torques.sd, own, float(sensed.sense.dot(resting)), shaking)
     if sensed.force_sd == math.inf:
         return Belief(force, before, math.inf, 0.0, errors, tolerance(size, own))
     sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)

@@ -227,6 +227,6 @@ class CommandRun:
             if not axis.is_force or axis.place is None or not (is_approach or one.watch.touch.is_there):
                 continue
             one.place.slide(forces.slide(q, axis.place.cover, axis.place.position, moved))
-            square = float(axis.along @ axis.along)
+            square = float(axis.along.dot(axis.along))
             if not one.watch.touch.is_there and square:
-                self.approached = self.approached + axis.along * (float(axis.along @ moved) / square)
+                self.approached = self.approached + axis.along * (float(axis.along.dot(moved)) / square)

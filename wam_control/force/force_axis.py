@@ -210,7 +210,7 @@ class ForceAxes:
 
     def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
         """Torque on each joint per force (n,), m, along a direction (3,), base frame, at a position of a cover, m."""
-        result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
+        result: Array = direction.dot(self._jacobian(q, cover, position, direction)[0])
         return result
 
     def disturbance(self, q: Sequence[float], pressed: PressedForce) -> list[Array]:
@@ -223,7 +223,7 @@ class ForceAxes:
         jacobian, point = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
         friction = self._parameters.friction * size * _across(direction, direction)
-        return [size * direction @ jacobian, *(friction @ jacobian), position_sd * size * direction @ slide]
+        return [(size * direction).dot(jacobian), *friction.dot(jacobian), (position_sd * size * direction).dot(slide)]
 
     def link_axis(self, q: Sequence[float], cover: str) -> Array:
         """Direction (3,) along a cover, base frame."""
@@ -233,13 +233,13 @@ class ForceAxes:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
         point = (position, *self.covers.aside(cover, position))
         along = self.link_axis(q, cover)
-        return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
+        return float(along.dot(self._body.point_jacobian(q, cover, point)) @ moved)
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
         covers = self.covers
         point = np.array([position, *covers.aside(cover, position)])
-        point += covers.radius_of(cover) * (self._body.cover_pose(q, cover).rotation.T @ normal)
+        point += covers.radius_of(cover) * self._body.cover_pose(q, cover).rotation.T.dot(normal)
         return self._body.point_jacobian(q, cover, point), point
 
     def _push(self, q: Sequence[float], cover: str, direction: Array) -> Array:
@@ -250,14 +250,14 @@ class ForceAxes:
         what holds the link gives such a force.
         """
         along = self.link_axis(q, cover)
-        aside = along * float(along @ direction)
+        aside = along * float(along.dot(direction))
         across: Array = direction - aside
         size, most = length(across), self._parameters.friction
         slope = math.sqrt(max(1.0 - size * size, 0.0)) / max(size, FORCE.least_normal)
         if slope <= most or size < FORCE.least_normal:
             return direction
         force: Array = across + max(2.0 * most / slope - 1.0, 0.0) * aside
-        return force / float(force @ direction)
+        return force / float(force.dot(direction))
 
     def axis(self, q: Sequence[float], pressed: PressedForce, others: Sequence[Array] = ()) -> ForceAxis:
         """The axis of a force at a contact.
@@ -271,8 +271,8 @@ class ForceAxes:
         parameters, n = self._parameters, len(q)
         cover, position, position_sd, direction, force = pressed
         jacobian, point = self._jacobian(q, cover, position, direction)  # friction acts at the surface
-        lever: Array = direction @ jacobian
-        square = float(lever @ lever)
+        lever: Array = direction.dot(jacobian)
+        square = float(lever.dot(lever))
         if square <= FORCE.least_lever * FORCE.least_lever:
             zero = np.zeros(n)
             none = np.zeros((n, n))
@@ -286,35 +286,35 @@ class ForceAxes:
         is_side = position + 2.0 * position_sd < end and not others
         push = aside if is_side else direction
         friction = parameters.friction * size * _across(direction, push)
-        tangential = friction @ jacobian
+        tangential = friction.dot(jacobian)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
-        press: Array = push @ jacobian
-        shift = push @ slide * size
-        shifted = friction @ slide  # friction at another position has another lever
-        moved = outer(shift, shift) + shifted.T @ shifted
+        press: Array = push.dot(jacobian)
+        shift = push.dot(slide) * size
+        shifted = friction.dot(slide)  # friction at another position has another lever
+        moved = outer(shift, shift) + shifted.T.dot(shifted)
         spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
         across = np.vstack([tangential, *others]) if others else tangential
-        spread += across.T @ across
+        spread += across.T.dot(across)
         moved *= position_sd**2
         weight = inverse(spread + moved)
         inertia = self.inertia(q)
         least = parameters.least_apparent_mass * square if parameters.least_apparent_mass else -math.inf
-        sense = _passive(weight, press, inertia @ lever, least)
-        carried: Array = sense @ inertia
-        mass = float(carried @ lever) / square
-        impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)
+        sense = _passive(weight, press, inertia.dot(lever), least)
+        carried: Array = sense.dot(inertia)
+        mass = float(carried.dot(lever)) / square
+        impact = float(lever.dot(inertia + self._rotors).dot(lever)) / (square * square)
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        friction_sd = length(across @ sense)
-        place_sd = math.sqrt(float(sense @ moved @ sense))
-        yielding = float(lever @ self._compliance @ lever)
+        friction_sd = length(across.dot(sense))
+        place_sd = math.sqrt(float(sense.dot(moved).dot(sense)))
+        yielding = float(lever.dot(self._compliance).dot(lever))
         return ForceAxis(
             lever,
             press,
             sense,
             lever / damped,
-            math.sqrt(float(sense @ (spread + moved) @ sense)),
+            math.sqrt(float(sense.dot(spread + moved).dot(sense))),
             friction_sd,
             place_sd,
             carried,
@@ -345,12 +345,12 @@ def _passive(weight: Array, press: Array, carried: Array, least: float) -> Array
     carried : torque on each joint as the arm moves along the force (n,), kg m^2.
     least : of s.carried, kg m^2.
     """
-    pressed, moved = weight @ press, weight @ carried
-    size, mixed = float(press @ pressed), float(press @ moved)
+    pressed, moved = weight.dot(press), weight.dot(carried)
+    size, mixed = float(press.dot(pressed)), float(press.dot(moved))
     sense: Array = pressed / size
     if mixed >= least * size:
         return sense
-    moving = float(carried @ moved)
+    moving = float(carried.dot(moved))
     apart = size * moving - mixed * mixed
     if apart <= FORCE.negligible * size * moving:
         return sense  # the torques of the force are those of the motion along it
@@ -360,14 +360,14 @@ def _passive(weight: Array, press: Array, carried: Array, least: float) -> Array
 
 def _unexplained(precision: Array, press: Array, torques: Array) -> float:
     """chi^2 of torques (n,), N m, apart from the multiple of `press` that explains them best."""
-    weighted = precision @ torques
-    force = float(press @ weighted)
-    return float(torques @ weighted) - force * force / float(press @ precision @ press)
+    weighted = precision.dot(torques)
+    force = float(press.dot(weighted))
+    return float(torques.dot(weighted)) - force * force / float(press.dot(precision).dot(press))
 
 
 def _across(direction: Array, push: Array) -> Array:
     """Rows (3, 3) of forces across a push that leave its part along the direction as it is, each as large as 1 N/N."""
-    square = float(push @ push)
+    square = float(push.dot(push))
     across = math.sqrt(square) * (np.eye(3) - outer(push, push) / square)
-    result: Array = across - outer(across @ direction, push)
+    result: Array = across - outer(across.dot(direction), push)
     return result

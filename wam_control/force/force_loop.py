@@ -332,7 +332,7 @@ class ForceLoop:
                 continue
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
             one.watch.touch.step(force, size, dt)
-            way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along @ moved)
+            way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(moved))
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
             found += one.watch.step(axis, Seen(known, way, touched if is_touched else "", is_led), torques.now, own, dt)
         if run.axes and run.is_touching and not any(event.holds for event in found):

@@ -38,7 +38,7 @@ class Knowledge:
         known, place = self._as_placed(axis), axis.place
         if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
             return known
-        if abs(float(axis.direction @ self._forces.link_axis(q, place.cover))) > math.sin(STEEPEST):
+        if abs(float(axis.direction.dot(self._forces.link_axis(q, place.cover)))) > math.sin(STEEPEST):
             return known  # nor will it be known
         # what is touched shows where, and the better the harder it is pressed
         sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0

@@ -100,8 +100,8 @@ def servo_yielding(axis: CommandedAxis, servo_stiffness: Array, own: ForceLoopPa
     """
     if axis.place is None or axis.place.is_known or not own.is_estimated:
         return 0.0
-    square = float(axis.along @ axis.along)
-    return square * square / max(float(axis.along @ servo_stiffness @ axis.along), FORCE.negligible)
+    square = float(axis.along.dot(axis.along))
+    return square * square / max(float(axis.along.dot(servo_stiffness).dot(axis.along)), FORCE.negligible)
 
 
 def is_too_slow(axis: CommandedAxis, own: ForceLoopParameters) -> bool:
@@ -140,7 +140,7 @@ class WorldPush(NamedTuple):
     @classmethod
     def at(cls, torques: Array, size: float, jacobian: Array) -> "WorldPush":
         """What pushes with these torques (n,), N m, of this certain size at a point with this Jacobian (3, n)."""
-        lever = max(math.sqrt(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]), FORCE.least_lever)
+        lever = max(math.sqrt(np.linalg.eigvalsh(jacobian.dot(jacobian.T))[-1]), FORCE.least_lever)
         return cls(size / lever, torques, lever)
 
     def row(self, allowed: float, gain: float, fastest: float) -> VelocityRow:
@@ -177,7 +177,7 @@ def followed(
     assert axis.place is not None
     assert axis.sensed is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
-    slide = FORCE.slide_slope * length(body.point_jacobian(q, axis.place.cover, point) @ posture)
+    slide = FORCE.slide_slope * length(body.point_jacobian(q, axis.place.cover, point).dot(posture))
     pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(latency(own), FORCE.negligible))
     most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)
     return posture * (most / slide) if slide > most else posture
