@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.contact_place import ForcePlace
-from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
+from wam_control.force.force_axis import UNTURNED, ForceAxes, ForceAxis, PressedForce
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
@@ -88,7 +88,7 @@ class TaskAxes:
         places : where each axis acts.
         sides : 1 or -1, where along its direction each impedance touches; those of forces follow from their sign.
         """
-        rotation = np.eye(3) if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
+        rotation = UNTURNED if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
         signs = [
             (-1.0 if (axis.value or 0.0) < 0.0 else 1.0) if axis.kind is AxisKind.FORCE else side
             for axis, side in zip(task.axes, sides, strict=True)

@@ -24,6 +24,7 @@ from wam_description.transmission_map import TransmissionMap
 Array = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
+UNTURNED = np.eye(3)  # rotation of the base frame
 
 
 @dataclass(frozen=True)
@@ -220,7 +221,7 @@ class ForceAxes:
         """
         cover, position, position_sd, direction, force = pressed
         size = max(force, FORCE.sized_force)
-        jacobian, point = self._jacobian(q, cover, position, direction)
+        jacobian, point, _ = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
         friction = self._parameters.friction * size * _across(direction, direction)
         return [(size * direction).dot(jacobian), *friction.dot(jacobian), (position_sd * size * direction).dot(slide)]
@@ -235,21 +236,20 @@ class ForceAxes:
         along = self.link_axis(q, cover)
         return float(along.dot(self._body.point_jacobian(q, cover, point)) @ moved)
 
-    def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
-        """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
-        covers = self.covers
+    def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array, Array]:
+        """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, the point, and the axis."""
+        covers, rotation = self.covers, self._body.cover_pose(q, cover).rotation
         point = np.array([position, *covers.aside(cover, position)])
-        point += covers.radius_of(cover) * self._body.cover_pose(q, cover).rotation.T.dot(normal)
-        return self._body.point_jacobian(q, cover, point), point
+        point += covers.radius_of(cover) * rotation.T.dot(normal)
+        return self._body.point_jacobian(q, cover, point), point, rotation[:, 0]
 
-    def _push(self, q: Sequence[float], cover: str, direction: Array) -> Array:
+    def _push(self, along: Array, direction: Array) -> Array:
         """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
 
         Friction up to `friction` holds the link, and the force is along the direction.  Where this is inclined further
         to the normal of the link's side, the link slides, and the force turns to the normal; beyond `least_normal` only
         what holds the link gives such a force.
         """
-        along = self.link_axis(q, cover)
         aside = along * float(along.dot(direction))
         across: Array = direction - aside
         size, most = length(across), self._parameters.friction
@@ -270,7 +270,7 @@ class ForceAxes:
         """
         parameters, n = self._parameters, len(q)
         cover, position, position_sd, direction, force = pressed
-        jacobian, point = self._jacobian(q, cover, position, direction)  # friction acts at the surface
+        jacobian, point, along = self._jacobian(q, cover, position, direction)  # friction acts at the surface
         lever: Array = direction.dot(jacobian)
         square = float(lever.dot(lever))
         if square <= FORCE.least_lever * FORCE.least_lever:
@@ -280,7 +280,7 @@ class ForceAxes:
                 lever, zero, zero, zero, math.inf, 0.0, 0.0, zero, math.inf, math.inf, 0.0, 0.0, none, none
             )
         size = max(force, FORCE.sized_force)
-        aside = self._push(q, cover, direction)
+        aside = self._push(along, direction)
         end = self.covers.length_of(cover) - self.covers.radius_of(cover)
         # the end of a link is round, and other forces at the same position press the surface as well
         is_side = position + 2.0 * position_sd < end and not others
@@ -368,6 +368,6 @@ def _unexplained(precision: Array, press: Array, torques: Array) -> float:
 def _across(direction: Array, push: Array) -> Array:
     """Rows (3, 3) of forces across a push that leave its part along the direction as it is, each as large as 1 N/N."""
     square = float(push.dot(push))
-    across = math.sqrt(square) * (np.eye(3) - outer(push, push) / square)
+    across = math.sqrt(square) * (UNTURNED - outer(push, push) / square)
     result: Array = across - outer(across.dot(direction), push)
     return result

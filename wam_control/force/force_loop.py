@@ -20,7 +20,7 @@ from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief, WorldTorques
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
-from wam_control.force.force_axis import ForceAxes
+from wam_control.force.force_axis import UNTURNED, ForceAxes
 from wam_control.force.force_command import CommandAdmission, Commands, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.force_measurement import ForceMeasurement
@@ -301,7 +301,7 @@ class ForceLoop:
         if axis.joint >= 0:
             return ForcePlace("", 0.0, 0.0)
         if contact.cover and axis.position is None:
-            turn = np.eye(3) if task.frame == BASE else self._body.cover_pose(self._q, task.frame).rotation
+            turn = UNTURNED if task.frame == BASE else self._body.cover_pose(self._q, task.frame).rotation
             along = self._body.cover_pose(self._q, contact.cover).rotation[:, 0]
             lean = math.asin(min(abs(float(turn @ np.array(axis.direction) @ along)), 1.0))
         place = memory.step(axis, contact, lean, self.parameters)
@@ -383,7 +383,7 @@ class ForceLoop:
         low, high = joint_bounds(self._q, self._body.arm.joints, own)
         is_yielding = self._pushed.event is not None or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
         if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
-            low, high = accelerated(low, high, self._velocity, own.limits.joint_acceleration * dt)
+            low, high = accelerated(low, high, self._velocity.tolist(), own.limits.joint_acceleration * dt)
         velocity, unlimited = solve(rows, wanted, least, low, high)
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
         if velocity is not unlimited:
@@ -466,8 +466,8 @@ class ForceLoop:
         for one in run.axes:
             axis = one.now
             if axis.is_force and axis.desired and axis.place and one.watch.touch.has_been and own.limits.impact:
-                far = np.full(len(wanted), math.inf)
-                left = solve([row._replace(speed=0.0) for row in rows], wanted, [], -far, far).velocity
+                far, still = [math.inf] * len(wanted), [row._replace(speed=0.0) for row in rows]
+                left = solve(still, wanted, [], [-math.inf] * len(wanted), far).velocity
                 wanted = followed(left, axis, self._body, self._q, own)
         return wanted
 

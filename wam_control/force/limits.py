@@ -17,27 +17,28 @@ from wam_description.rigid_body import RigidBody
 from wam_description.small_matrices import length
 
 Array = NDArray[np.float64]
+Bounds = tuple[list[float], list[float]]
 
 
-def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -> tuple[Array, Array]:
+def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -> Bounds:
     """Least and largest velocity of each joint (n,), rad/s: its speed limit, and a velocity damper at its ends."""
     gain, margin, speed = own.limits.joint_gain, own.limits.joint_margin, own.joint_speed_limit
     if not gain:
-        return np.full(len(q), -speed), np.full(len(q), speed)
+        return [-speed] * len(q), [speed] * len(q)
 
     def towards(distance: float) -> float:
         if distance < 0.0:
             return max(gain * distance, -FORCE.push_back)
         return min(gain * max(distance - margin, 0.0), speed)
 
-    ends = zip(joints.lower, q, joints.upper, strict=True)
-    low, high = zip(*((-towards(at - lower), towards(upper - at)) for lower, at, upper in ends), strict=True)
-    return np.array(low), np.array(high)
+    low = [-towards(at - lower) for lower, at in zip(joints.lower, q, strict=True)]
+    return low, [towards(upper - at) for upper, at in zip(joints.upper, q, strict=True)]
 
 
-def accelerated(low: Array, high: Array, before: Array, step: float) -> tuple[Array, Array]:
+def accelerated(low: Sequence[float], high: Sequence[float], before: Sequence[float], step: float) -> Bounds:
     """Bounds (n,), rad/s, within a step of the velocities before (n,), rad/s; those of the speed come first."""
-    return np.minimum(np.maximum(low, before - step), high), np.maximum(np.minimum(high, before + step), low)
+    each = list(zip(low, high, before, strict=True))
+    return [min(max(a, v - step), b) for a, b, v in each], [max(min(b, v + step), a) for a, b, v in each]
 
 
 def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:

@@ -47,7 +47,11 @@ class Solution(NamedTuple):
 
 
 def solve(
-    rows: Sequence[VelocityRow], posture: Array, least: Sequence[VelocityRow], low: Array, high: Array
+    rows: Sequence[VelocityRow],
+    posture: Array,
+    least: Sequence[VelocityRow],
+    low: Sequence[float],
+    high: Sequence[float],
 ) -> Solution:
     """The joint velocities of one period.
 
@@ -67,11 +71,11 @@ def solve(
     else:
         unlimited = posture
     broken = [row for row in least if row.size > FORCE.shortest_lever]
-    each = zip(low.tolist(), unlimited.tolist(), high.tolist())  # noqa: B905 - as long as each other
+    each = zip(low, unlimited.tolist(), high)  # noqa: B905 - as long as each other
     is_inside = all([slowest <= speed <= fastest for slowest, speed, fastest in each])  # noqa: C419 - a list takes half the time
     if is_inside and all(along.dot(unlimited) >= speed for along, speed in broken):
         return Solution(unlimited, unlimited)
-    return Solution(_limited(rows, posture, broken, low, high), unlimited)
+    return Solution(_limited(rows, posture, broken, np.array(low), np.array(high)), unlimited)
 
 
 def _limited(
