@@ -1,7 +1,6 @@
 """Bags on disk: their files found and opened, their messages selected, and errors in the user's words."""
 
 import re
-from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -35,19 +34,17 @@ def files(path: Path) -> list[Path]:
     if not path.exists():
         raise BagError(f"{path} does not exist; give a bag directory or an .mcap file")
     found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
-    named = _listed_files(path)
+    named, there = _listed_files(path), [file.name for file in found]
     for name in named:
-        if not (path / name).is_file():
+        if name not in there:
             raise BagError(
                 f"{path} lacks its file {name}; copy the whole directory, or read its .mcap files one by one"
             )
-    if forgotten := sorted({file.name for file in found} - set(named)) if named else []:
+    if forgotten := [name for name in there if named and name not in named]:
         raise BagError(
             f"{path} has the file {forgotten[0]}, which its metadata.yaml does not list; "
             f"{command('wam bag repair', path)} writes it again, or give the file by itself"
         )
-    if named:
-        return [path / name for name in named]
     if not found:
         refuse_compressed(path)
         raise BagError(f"{path} has no .mcap file and no .db3 file; give the directory of a bag")
@@ -68,14 +65,8 @@ def _listed_files(path: Path) -> list[str]:
     except (yaml.YAMLError, ValueError, KeyError, TypeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BagError(f"{file} is damaged ({reason}); {command('wam bag repair', path)} writes it again") from None
-    for name, times in Counter(listed).items():
-        if name.endswith(COMPRESSED):
-            raise _compressed(path)
-        if times > 1 or Path(name).is_absolute() or ".." in Path(name).parts or not name.endswith(".mcap"):
-            raise BagError(
-                f"{file} lists {name}, which cannot be a file of this bag, or is there twice; "
-                f"{command('wam bag repair', path)} writes metadata.yaml again from the files in the directory"
-            )
+    if any(name.endswith(COMPRESSED) for name in listed):
+        raise _compressed(path)
     return listed
 
 

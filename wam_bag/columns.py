@@ -29,19 +29,6 @@ JOINT_FIELDS = ("position", "velocity", "effort")
 UNNAMED, DOUBLED = "joints without a name", "a joint's name twice"
 
 
-def _shown(columns: Any) -> str:
-    """A line for a prompt, in place of every array."""
-    listed = next((getattr(columns, name) for name in ("names", "columns", "frames") if name in columns._fields), ())
-    named = ", ".join(map(str, dict.fromkeys(listed)))
-    return f"{type(columns).__name__}({len(columns.log_time_ns)} messages{': ' * bool(named)}{named})"
-
-
-def _brief(kind: Any) -> Any:
-    kind.__repr__ = _shown
-    return kind
-
-
-@_brief
 class JointColumns(NamedTuple):
     """sensor_msgs/JointState, k messages of n joints, matched by name.
 
@@ -60,7 +47,6 @@ class JointColumns(NamedTuple):
     irregular: Mapping[str, int] = MappingProxyType({})
 
 
-@_brief
 class WrenchColumns(NamedTuple):
     """geometry_msgs/WrenchStamped, k messages: force (k, 3) N, torque (k, 3) N m."""
 
@@ -71,7 +57,6 @@ class WrenchColumns(NamedTuple):
     torque: Numbers
 
 
-@_brief
 class PointColumns(NamedTuple):
     """geometry_msgs/PointStamped, k messages: point (k, 3) m."""
 
@@ -81,7 +66,6 @@ class PointColumns(NamedTuple):
     point: Numbers
 
 
-@_brief
 class TableColumns(NamedTuple):
     """sensor_msgs/PointCloud2, k messages with p points together: a table with a row for each point.
 
@@ -101,7 +85,6 @@ class TableColumns(NamedTuple):
         return self.stamp_ns[self.message]
 
 
-@_brief
 class BoolColumns(NamedTuple):
     """std_msgs/Bool, k messages."""
 
@@ -109,7 +92,6 @@ class BoolColumns(NamedTuple):
     data: Mask
 
 
-@_brief
 class Messages(NamedTuple):
     """Messages of any other type; fields are attributes, arrays of numbers numpy arrays."""
 

@@ -24,7 +24,7 @@ Metadata = Mapping[str, Mapping[str, str]]
 
 
 class Hole(NamedTuple):
-    """A part of a file that could not be read: log times between which its messages were, ns, None if unknown."""
+    """A part of a file that could not be read: log times before and behind it, ns, None if there is none."""
 
     begin: int | None
     end: int | None
@@ -39,8 +39,7 @@ class FileLosses(NamedTuple):
     bytes : that could not be read.
     closed : whether the file had been finished; else it is not known what was recorded after its end.
     holes : the parts that could not be read.
-    messages : number of lost ones by topic, as far as it is known from indexes or the file's own count.
-    all_known : whether these are all.
+    messages : number of lost ones by topic, by the file's own count; none where it has none.
     others : attachments, metadata records and definitions that were lost.
     """
 
@@ -48,7 +47,6 @@ class FileLosses(NamedTuple):
     closed: bool
     holes: tuple[Hole, ...]
     messages: dict[str, int]
-    all_known: bool
     others: int
 
     def text(self) -> str:
@@ -161,7 +159,7 @@ def _sentences(name: str, found: FileLosses | None, first: int) -> list[str]:
     if found.holes or found.messages or found.others:
         line = f"{name} was damaged and has been repaired: {found.bytes} bytes could not be read"
         if found.messages:
-            line += f"; lost are {'' if found.all_known else 'at least '}{_counted(found.messages)}"
+            line += f"; lost are {_counted(found.messages)}"
         elif found.holes:
             line += "; it is not known how many messages were lost"
         if found.others:

@@ -216,13 +216,6 @@ class McapFile(BagFile):
         """Whether the record at a place ends the data, so that no messages are behind it."""
         return self._data[position : position + HEAD.size] == _DATA_END
 
-    def indexes_behind(self, position: int) -> Iterator[bytes]:
-        """Contents of the message indexes behind a chunk."""
-        for record in walk(self._data, position, self.size):
-            if record.opcode != Opcode.MESSAGE_INDEX:
-                return
-            yield self.content(record)
-
     def content(self, record: RecordExtent) -> bytes:
         """Content of a record."""
         return self._data[record.start + HEAD.size : record.end]

@@ -52,11 +52,12 @@ class Group(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A layout and how its messages are recognised: spans of words with the bits that must be equal."""
+    """A layout and how its messages are recognised: the bits of their words that must be equal, and their values."""
 
     size: int
     layout: Layout
-    spans: list[tuple[int, int, Words, Words]]
+    mask: Words
+    want: Words
 
     @staticmethod
     def of(layout: Layout) -> "Known":
@@ -66,17 +67,11 @@ class Known(NamedTuple):
         mask, want = np.zeros(width, np.uint8), np.zeros(width, np.uint8)
         mask[BEFORE : BEFORE + size][layout.fixed] = 255
         want[BEFORE : BEFORE + size] = np.frombuffer(layout.data, np.uint8)
-        masks, wants = mask.view(np.uint64), (want & mask).view(np.uint64)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], masks != 0, [0]])))
-        spans = [(a, b, masks[a:b], wants[a:b]) for a, b in edges.reshape(-1, 2).tolist()]
-        return Known(size, layout, spans)
+        return Known(size, layout, mask.view(np.uint64), (want & mask).view(np.uint64))
 
-    def fits(self, words: Words) -> Mask | None:
-        """Which rows are of this layout; None if all are."""
-        wrong = [((words[:, a:b] & mask) != want) for a, b, mask, want in self.spans]
-        if not any(each.any() for each in wrong):
-            return None
-        return ~np.logical_or.reduce([each.any(axis=1) for each in wrong])
+    def fits(self, words: Words) -> Mask:
+        """Which rows are of this layout."""
+        return np.asarray(((words & self.mask) == self.want).all(axis=1), np.bool_)
 
 
 class Grouping:
@@ -106,7 +101,7 @@ class Grouping:
                     if len(self._known) < READING_LIMITS.layouts:
                         self._known.append(known)
                 fits = known.fits(words)
-                if fits is None:
+                if fits.all():
                     yield Group(rows, known.layout, words)
                     break
                 if fits.any():

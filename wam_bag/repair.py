@@ -1,6 +1,5 @@
 """Bags repaired: files that were not closed, or are damaged, written again from what can be read of them."""
 
-import contextlib
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -114,8 +113,6 @@ class _Copy:
         self._file, self._writer = file, writer
         self._bytes, self._others = 0, 0  # lost
         self._holes: list[Hole] = []
-        self._lost: Counter[int] = Counter()  # by channel id
-        self._all_known = True
         self._last: int | None = None  # log time of what was copied
         self._earlier: dict[str, str] = {}  # entries of earlier repairs
 
@@ -142,39 +139,24 @@ class _Copy:
         return losses
 
     def _lose(self, record: RecordExtent) -> None:
-        """Note what could not be read; of a chunk, its messages as far as the indexes behind it can be read."""
+        """Note what could not be read."""
         size = record.end - record.start
         self._bytes += size
-        index = self._times_of_lost_chunk(record.end) if record.opcode == Opcode.CHUNK else {}
-        if times := [time for found in index.values() for time in found]:
-            self._holes.append(Hole(min(times), max(times), size))
-            self._lost.update({channel: len(found) for channel, found in index.items()})
-        elif record.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+        if record.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
             self._holes.append(Hole(self._last, None, size))
-            self._all_known = False
         else:
             self._others += 1
 
-    def _times_of_lost_chunk(self, position: int) -> dict[int, list[int]]:
-        """Log times of the messages of a chunk by channel id."""
-        found: dict[int, list[int]] = {}
-        with contextlib.suppress(*BROKEN):
-            for content in self._file.indexes_behind(position):
-                index = parsed(Opcode.MESSAGE_INDEX, content)
-                found[index.channel_id] = [time for time, _ in index.records]
-        return found
-
     def _losses(self) -> FileLosses:
-        """The losses by topic; compared with the file's own count of its messages, if there is one."""
-        file, holes, lost = self._file, self._holes, self._lost
+        """The losses; by topic if the file has its own count of its messages."""
+        file, holes, messages = self._file, self._holes, Counter[str]()
         if holes and file.counts is not None:
-            lost, self._all_known = Counter(file.counts.by_channel) - Counter(self._writer.counts), True
+            lost = Counter(file.counts.by_channel) - Counter(self._writer.counts)
             holes = holes if lost else []  # only indexes could not be read
-        messages: Counter[str] = Counter()
-        for number, count in lost.items():
-            channel = file.channels.get(number)
-            messages[channel.topic if channel else f"channel {number}"] += count
-        return FileLosses(self._bytes, file.has_end(), tuple(holes), dict(messages), self._all_known, self._others)
+            for number, count in lost.items():
+                channel = file.channels.get(number)
+                messages[channel.topic if channel else f"channel {number}"] += count
+        return FileLosses(self._bytes, file.has_end(), tuple(holes), dict(messages), self._others)
 
     def _copy(self, record: RecordExtent) -> None:
         file, writer, opcode = self._file, self._writer, record.opcode
