@@ -44,8 +44,7 @@ class ShaftThresholds:
     unsure: float = 0.25  # of a number; with a larger standard error it is not identifiable
     below_zero: float = 3.0  # standard errors: a number so negative shows more than friction
     hidden: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
-    better: float = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
-    much_better: float = 0.5  # likewise, with a drag or a lag
+    much_better: float = 0.5  # of the rest of a fit: one with a lag leaves less
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1

@@ -640,7 +640,7 @@ def recorded_late(effort: Any, how: str) -> Any:
 @pytest.mark.parametrize(
     ("how", "of_velocity", "drag", "said"),
     [
-        ("filter", "", 0.0, "behind the motion"), ("late", "", 0.0, "behind the motion"), ("", "", 0.4, "drag"),
+        ("filter", "", 0.0, "behind the motion"), ("late", "", 0.0, "behind the motion"), ("", "", 0.4, ""),
         ("", "filter", 0.0, ""),
     ],
 )  # fmt: skip

@@ -2,28 +2,23 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import rest_speed
 from wam_analysis.foreign.sources import Piece, Source, differentiated, pieces, rests
-from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
+from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
-from wam_bag.arrays import Mask, Numbers
+from wam_bag.arrays import Numbers
 
 RECORD = (
     "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
     "and fast, for some ten seconds, while nothing touches the arm."
 )
 BELOW_ZERO = "its dry friction comes out as {}, as if the effort had the other sign, or something else moved the joint."
-WEIGHT, DRAG = "weight", "drag"
-ALSO = {
-    WEIGHT: "the fit includes the joint's weight",
-    DRAG: "the fit includes a drag by the square of the velocity",
-}
 
 
 def effort_section(recording: AnalysedRecording) -> Section:
@@ -62,7 +57,6 @@ def effort_section(recording: AnalysedRecording) -> Section:
             remarks.append(f"it moved at one frequency, where each ms of delay changes the viscous friction by {late}")
             alone.append(one.label)
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
-        remarks += [ALSO[name] for name in whole.also]
         way = "behind" if whole.lag > 0.0 else "before"
         remarks += [f"the effort is {shown(abs(whole.lag), 's')} {way} the motion"] * bool(whole.lag)
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
@@ -71,8 +65,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
     doubts += [RECORD] * bool(doubts)
     assumed = (
-        "The effort is explained by friction and inertia. The joint's weight, a drag by the square of the velocity and "
-        "a delay are added if they explain more. What is left makes the standard errors larger."
+        "The effort is explained by friction, inertia, the joint's weight, a drag by the square of the velocity, and "
+        "a delay where it explains more. What is left makes the standard errors larger."
     )
     if alone:
         doubts.append(
@@ -163,19 +157,17 @@ def _velocity_factor(some: Sequence[Piece]) -> float:
 
 
 class FoundFriction(NamedTuple):
-    """Friction and inertia of a joint, with what else its effort holds.
+    """Friction and inertia of a joint.
 
     Attributes
     ----------
-    friction : with errors that count what the effort may also hold.
-    also : what was found in it: of `WEIGHT` and `DRAG`.
+    friction : fitted with the weight and the drag that its effort may also hold.
     lag : s, of the effort behind the motion.
     per_lag : how the viscous friction changes where the effort of a motion of one frequency is later, per s; NaN of
         other motions.
     """
 
     friction: Friction
-    also: tuple[str, ...]
     lag: float
     per_lag: float
 
@@ -191,10 +183,10 @@ def friction(source: Source) -> FoundFriction | None:
 
     The recorded velocity must be the rate of the position, see `contradiction`.
 
-    The effort may also hold the weight of the joint itself, over its angle, a sin q + b cos q, or a drag c v|v|, and
-    may lag behind the motion, as where it is filtered, or the motion behind it.  What leaves less of the effort
-    unexplained is taken; by what the others would change, the errors are larger.  In a motion of one frequency inertia
-    and weight are the same, and the inertia is NaN; so are viscous friction and lag, and no lag is looked for.
+    The effort may also hold the weight of the joint itself, over its angle, a sin q + b cos q, and a drag c v|v|, and
+    may lag behind the motion, as where it is filtered, or the motion behind it: a lag that leaves much less of the
+    effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the inertia is NaN;
+    so are viscous friction and lag, and no lag is looked for.
     """
     needed = [q for q in ("position", "velocity", "effort") if q in source.values]
     if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
@@ -213,115 +205,73 @@ def friction(source: Source) -> FoundFriction | None:
         if q in some[0].values
     }
     velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)
-    columns = {DRAG: (velocity * np.abs(velocity))[:, np.newaxis]}
-    if "position" in joined and source.units["position"] == "rad":
-        columns[WEIGHT] = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
+    has_weight = "position" in joined and source.units["position"] == "rad"
+    load = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])] if has_weight else [0.0 * velocity])
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
-    trial = _Trial(velocity, joined["effort"], columns, rest, window, period)
+    trial = _Trial(velocity, joined["effort"], load, rest, window, period)
     width, per_lag = round(window / period), math.nan
-    acceleration = _Acceleration.of(velocity, sd, rest, width, period)
-    one_frequency = WEIGHT in columns and acceleration.own_part(columns[WEIGHT], width) < SHAFT.apart
-    found, also, shift = _best(trial, not one_frequency)
+    own, noise = _own_acceleration(velocity, sd, load, rest, width, period)
+    one_frequency = has_weight and own < SHAFT.apart
+    found, shift = (trial.fit(0), 0) if one_frequency else trial.best()
     if shift and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
         rates = [part for piece in some for part in (differentiated(piece.time, piece.values["position"])[0], blank)]
-        rate = np.concatenate(rates)
-        other = trial._replace(velocity=rate, columns=columns | {DRAG: (rate * np.abs(rate))[:, np.newaxis]})
-        found, also, shift = min((found, also, shift), _best(other, True), key=lambda one: one[0].residual)
-    inertia = _less_certain(found.inertia, [acceleration.share_of_noise() * found.inertia.value])
+        by_rate = trial._replace(velocity=np.concatenate(rates)).best()
+        found, shift = min((found, shift), by_rate, key=lambda one: one[0].residual)
+    inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
     if one_frequency:
-        per_lag, inertia = (found.viscous.value - trial.fit(also, 1).viscous.value) / period, UNKNOWN
-    return FoundFriction(found._replace(inertia=inertia), also, shift * period, per_lag)
+        per_lag, inertia = (found.viscous.value - trial.fit(1).viscous.value) / period, UNKNOWN
+    return FoundFriction(found._replace(inertia=inertia), shift * period, per_lag)
 
 
 class _Trial(NamedTuple):
-    """What friction is identified from; fits with further columns and with the effort shifted."""
+    """What friction is identified from; fits with the effort shifted."""
 
     velocity: Numbers
     effort: Numbers
-    columns: dict[str, Numbers]
+    load: Numbers
     rest: float
     window: float
     period: float
 
-    def fit(self, also: Sequence[str], shift: int) -> Friction:
-        """Friction with the columns of these names, and the effort of `shift` samples later."""
+    def fit(self, shift: int) -> Friction:
+        """Friction with the effort of `shift` samples later."""
         effort = np.roll(self.effort, -shift)
         time = self.period * np.arange(len(effort), dtype=np.float64)
-        load = np.hstack([self.columns[name] for name in also]) if also else None
-        return identify_friction(time, self.velocity, effort, self.rest, self.window, load=load)
+        drag = self.velocity * np.abs(self.velocity)
+        return identify_friction(
+            time, self.velocity, effort, self.rest, self.window, load=np.column_stack([drag, self.load])
+        )
 
-    def lag(self, also: Sequence[str]) -> int:
-        """The shift of the effort, samples, that leaves least unexplained."""
+    def best(self) -> tuple[Friction, int]:
+        """The fit with the shift of the effort, samples, that leaves least unexplained; none unless that is much."""
         most = math.ceil(SHAFT.longest_effort_lag / self.period)
         step, best = max(1, most // 4), 0
-        left = {0: self.fit(also, 0).residual}
+        fits = {0: self.fit(0)}
         while step:
             for shift in (best - step, best + step):
-                if abs(shift) <= most and shift not in left:
-                    left[shift] = self.fit(also, shift).residual
-            nearest = min(left, key=left.__getitem__)
+                if abs(shift) <= most and shift not in fits:
+                    fits[shift] = self.fit(shift)
+            nearest = min(fits, key=lambda shift: fits[shift].residual)
             step, best = (step if nearest != best and step > 1 else step // 2), nearest
-        return best
+        best = best if fits[best].residual < SHAFT.much_better * fits[0].residual else 0
+        return fits[best], best
 
 
-def _best(trial: _Trial, lags: bool) -> tuple[Friction, tuple[str, ...], int]:
-    """The fit with what else explains the effort, with errors that count what was left out; names; shift.
+def _own_acceleration(
+    velocity: Numbers, sd: float, load: Numbers, rest: float, width: int, period: float
+) -> tuple[float, float]:
+    """Share, rms, of the averaged acceleration that is not alike the columns of a load, and the noise in its power.
 
-    Parameters
-    ----------
-    lags : whether the effort may lag.
+    By the share of the noise of the velocity, of a standard deviation, an inertia is too small.
     """
-    also: tuple[str, ...] = ()
-    shift = 0
-    found = trial.fit(also, shift)
-    while True:
-        others = [((*also, name), shift) for name in trial.columns if name not in also]
-        others += [(also, lag)] if lags and not shift and (lag := trial.lag(also)) else []
-        fits = [trial.fit(*other) for other in others]
-        least = [SHAFT.better if WEIGHT in {*other[0]} - {*also} else SHAFT.much_better for other in others]
-        gains = [(fit.residual / share, i) for i, (fit, share) in enumerate(zip(fits, least, strict=True))]
-        if not gains or not min(gains)[0] < found.residual:
-            break
-        i = min(gains)[1]
-        (also, shift), found = others[i], fits[i]
-    doubted: dict[str, Any] = {
-        name: _less_certain(own := getattr(found, name), [getattr(fit, name).value - own.value for fit in fits])
-        for name in ("dynamic", "viscous", "inertia")
-    }
-    return found._replace(**doubted), also, shift
-
-
-def _less_certain(known: FrictionNumber, more: Sequence[float]) -> FrictionNumber:
-    """A number with further errors."""
-    return known._replace(error=math.hypot(known.error, *more))
-
-
-class _Acceleration(NamedTuple):
-    """Averaged acceleration, the variance of its noise, and where the joint moves so that it is complete."""
-
-    value: Numbers
-    noise: float
-    rows: Mask
-
-    @classmethod
-    def of(cls, velocity: Numbers, sd: float, rest: float, width: int, period: float) -> "_Acceleration":
-        """That of a velocity with noise of a standard deviation, over two means of `width` samples."""
-        kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
-        value = np.convolve(velocity, kernel, "same")
-        return cls(value, sd**2 * float(kernel @ kernel), (np.abs(velocity) > rest) & np.isfinite(value))
-
-    def share_of_noise(self) -> float:
-        """Share of the power that is noise of the velocity: so much too small is the inertia."""
-        whole = float(np.var(self.value[self.rows])) if np.any(self.rows) else 0.0
-        return min(self.noise / whole, 1.0) if whole > 0.0 else 1.0
-
-    def own_part(self, weight: Numbers, width: int) -> float:
-        """Share, rms, that is not alike the columns of a weight, without the noise of the velocity."""
-        rows = self.rows & np.all(np.isfinite(weight), axis=1)
-        rows[:width] = rows[-width:] = False  # the mean is incomplete
-        if np.count_nonzero(rows) < SHAFT.fewest_samples:
-            return 0.0
-        columns, wanted = np.column_stack([np.ones(np.count_nonzero(rows)), weight[rows]]), self.value[rows]
-        rest = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
-        own, whole = float(np.mean(rest**2)) - self.noise, float(np.var(wanted)) - self.noise
-        return math.sqrt(own / whole) if 0.0 < own < whole else 0.0
+    kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
+    acceleration = np.convolve(velocity, kernel, "same")
+    rows = (np.abs(velocity) > rest) & np.isfinite(acceleration) & np.all(np.isfinite(load), axis=1)
+    rows[:width] = rows[-width:] = False  # the mean is incomplete
+    if np.count_nonzero(rows) < SHAFT.fewest_samples:
+        return 0.0, 1.0
+    columns, wanted = np.column_stack([np.ones(np.count_nonzero(rows)), load[rows]]), acceleration[rows]
+    rest_of_it = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    noise, power = sd**2 * float(kernel @ kernel), float(np.mean(rest_of_it**2))
+    own, whole = power - noise, float(np.var(wanted)) - noise
+    return math.sqrt(own / whole) if 0.0 < own < whole else 0.0, min(noise / power, 1.0) if power > 0.0 else 1.0

@@ -1,7 +1,5 @@
 """Intervals in which a condition holds, and the noise of a signal."""
 
-import heapq
-
 import numpy as np
 
 from wam_analysis.thresholds import STREAM
@@ -43,24 +41,18 @@ def without_short(mask: Mask, shortest: int) -> Mask:
     shortest : samples.
     """
     kept = mask.copy()
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8))) + 1
-    bounds = np.concatenate(([0], edges, [len(mask)])).tolist()
-    before, after = list(range(-1, len(bounds) - 1)), list(range(1, len(bounds) + 1))  # remaining bounds
-    queue = [(bounds[i + 1] - bounds[i], i) for i in range(1, len(bounds) - 2) if bounds[i + 1] - bounds[i] < shortest]
-    heapq.heapify(queue)
-    remains = [True] * len(bounds)
-    while queue:
-        length, i = heapq.heappop(queue)
-        j = after[i]
-        if not remains[i] or i == 0 or j >= len(bounds) - 1 or bounds[j] - bounds[i] != length:
-            continue
-        kept[bounds[i] : bounds[j]] = ~kept[bounds[i]]
-        remains[i] = remains[j] = False
-        left, right = before[i], after[j]
-        after[left], before[right] = right, left
-        longer = bounds[right] - bounds[left]
-        if left > 0 and right < len(bounds) - 1 and longer < shortest:
-            heapq.heappush(queue, (longer, left))
+    for length in range(1, shortest):
+        while True:
+            bounds = np.flatnonzero(np.diff(kept)) + 1
+            short = np.flatnonzero(np.diff(bounds) <= length)
+            if not len(short):
+                break
+            row = np.arange(len(short))  # of neighbours that are short, every other one
+            first = np.maximum.accumulate(np.where(np.diff(short, prepend=-2) > 1, row, 0))
+            merged = short[(row - first) % 2 == 0]
+            turns = np.zeros(len(kept), np.bool_)
+            turns[bounds[merged]] = turns[bounds[merged + 1]] = True
+            kept ^= np.logical_xor.accumulate(turns)
     return kept
 
 
