@@ -88,7 +88,8 @@ def assess(
     start : x, v, x_m at time 0.
     tolerance : relative, of the repetition.
     max_events : at most; without another verdict by then, it is a limit cycle (not strictly periodic) if the
-        standstills of the last two quarters span the same force to 2 %, else undecided.
+        standstills of the last two quarters lie between the same two forces, to 2 % of their span, else undecided:
+        a force that still rises in even steps has the same span, too.
     """
     model = prepared(node, loop, force)
     stiffness = node.contact_stiffness
@@ -151,15 +152,15 @@ def _cycle(turns: Sequence[tuple[float, float]], tolerance: float, scale: float)
 
 
 def _irregular_cycle(turns: Sequence[tuple[float, float]], force: float) -> tuple[Verdict, float, float]:
-    """Verdict from the spans of the last two quarters of the standstills."""
+    """Verdict from the largest and smallest forces of the last two quarters of the standstills."""
     quarter = len(turns) // 4
     if quarter < 8:
         return Verdict.UNDECIDED, math.nan, math.nan
     before = [f for _, f in turns[-2 * quarter : -quarter]]
     late = [f for _, f in turns[-quarter:]]
-    spans = max(before) - min(before), max(late) - min(late)
-    if abs(spans[1] - spans[0]) > 0.02 * spans[1]:
+    span = max(late) - min(late)
+    if abs(min(late) - min(before)) + abs(max(late) - max(before)) > 0.02 * span:
         return Verdict.UNDECIDED, math.nan, math.nan
     passes = sum((f1 < force) != (f2 < force) for f1, f2 in pairwise(late))
     period = 2.0 * (turns[-1][0] - turns[-quarter][0]) / passes if passes else math.nan
-    return Verdict.LIMIT_CYCLE, spans[1], period
+    return Verdict.LIMIT_CYCLE, span, period

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from wam_theory.friction_verdict import stiction_cycle
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import (
     FrictionNode,
@@ -285,6 +286,14 @@ def test_early_verdicts_are_those_of_long_runs() -> None:
 
 
 # ---------------------------------------------------------------------------- stiction limit cycle
+def test_a_force_that_still_rises_in_even_steps_is_not_in_a_cycle_yet() -> None:
+    node, loop = FrictionNode(1.0, 0.06, 1.2, 0.08, 1.0, 1.07), IntegralLoop(0.14, 0.5, sample_period=0.5)
+    assert assess(node, loop, 30.0, max_events=3000).verdict is Verdict.UNDECIDED
+    cycle = assess(node, loop, 30.0)
+    assert cycle.verdict is Verdict.LIMIT_CYCLE
+    assert cycle.peak_to_peak == pytest.approx(stiction_cycle(node, loop.gain).peak_to_peak, rel=0.02)
+
+
 def test_saturation_lets_a_destabilising_step_survive() -> None:
     for step in (4.0, 40.0):
         assert assess(unit_node(), IntegralLoop(1.5), step).verdict is Verdict.DIVERGED
