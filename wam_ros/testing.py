@@ -21,9 +21,9 @@ from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import Interface, declared, require_parameters
-from wam_description.parameters import ParameterError, dotted
+from wam_description.parameters import ParameterError, dotted, meant
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH
+from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
@@ -32,7 +32,7 @@ from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
-from wam_ros.wire import decoder, stamp_in
+from wam_ros.wire import decoder, encoder, stamp_in
 
 _EMPTY: Final[Mapping[str, Any]] = {
     JOINT_STATE: State([], [], []),
@@ -40,6 +40,7 @@ _EMPTY: Final[Mapping[str, Any]] = {
     POINT: Point(BASE, ZERO),
     TABLE: Table(BASE, ()),
 }
+ANY: Final = "position? velocity? effort?"  # arrays of a JointState
 _COUNTER = itertools.count()
 
 
@@ -83,7 +84,8 @@ class Recorded(Mapping[str, Any]):
 
     def __getitem__(self, topic: str) -> Any:
         if not (data := self.data.get(topic)):
-            raise KeyError(f"nothing was recorded on '{topic}' so far; topics with messages: {', '.join(self)}")
+            near, there = meant(topic, self.data) if topic not in self.data else "", ", ".join(self) or "none"
+            raise KeyError(f"nothing was recorded on '{topic}' so far; {near}topics with messages: {there}")
         return self._columns(topic, len(data))
 
     def __iter__(self) -> Iterator[str]:
@@ -190,9 +192,8 @@ class RunningArm:
 
     def newest(self, topic: str) -> Any:
         """The newest message of a topic as a value, None before the first; cheaper than `recorded` in a condition."""
-        data = self.recorded.data[topic]
-        row = self.interface.topics[topic]
-        return decoder(row, self.configuration.shared, "position? velocity? effort?")(data[-1]) if data else None
+        row, data = self._row(topic), self.recorded.data[topic]
+        return decoder(row, self.configuration.shared, ANY)(data[-1]) if data else None
 
     def status(self, node: str) -> NodeStatus | None:
         """The newest status of a node, None before the first."""
@@ -309,20 +310,37 @@ class RunningArm:
         seconds : arm's time in which it is sent again with each joint state, as a command is valid for a short time
             only; 0 sends it once.
         fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.
+
+        Raises
+        ------
+        ValueError
+            where there is no such topic, or no node takes it that would refuse a value of a wrong shape.
         """
         self.publisher(topic)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
         stamp = stamp_in(states[-1]) if states else 0
-        self._streams[topic] = stamp + round(seconds * SECOND), self.value(topic, **fields) if value is None else value
+        value = self.value(topic, **fields) if value is None else value
+        if not self.interface.subscribers(topic):
+            row, shared = self._row(topic), self.configuration.shared
+            decoder(row, shared, ANY)(encoder(row, shared)(stamp, value))
+        self._streams[topic] = stamp + round(seconds * SECOND), value
         self._stream(stamp, topic)
 
     def value(self, topic: str, **fields: Any) -> Any:
         """A value of a topic; what is not given is empty or zero."""
-        return _EMPTY[self.interface.topics[topic].type]._replace(**fields)
+        return _EMPTY[self._row(topic).type]._replace(**fields)
+
+    def _row(self, topic: str) -> Topic:
+        """The row of a topic."""
+        self._require_start()
+        rows = self.interface.topics
+        if topic not in rows:
+            raise ValueError(f"no topic is named '{topic}'; {meant(topic, rows)}this stack has {', '.join(rows)}")
+        return rows[topic]
 
     def publisher(self, topic: str) -> Publisher:
         """A publisher of the test; every node of the stack that takes the topic has found it."""
-        self._require_start()
+        self._row(topic)
         publisher, takers = self._client.publisher(topic), len(self.interface.subscribers(topic))
         self.run_until(lambda: publisher.get_subscription_count() >= takers)
         return publisher

@@ -68,6 +68,12 @@ def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningAr
     common, at, of = np.intersect1d(states.stamp_ns, efforts.stamp_ns, return_indices=True)
     assert len(common) > 10
     np.testing.assert_array_equal(efforts.effort[of], -2.0 * states.velocity[at])
+    for name, reason in (
+        ("joint_posture_comand", "did you mean 'joint_posture_command'"),
+        ("joint_posture_command", "send 4"),
+    ):
+        with pytest.raises(ValueError, match=reason):  # which no node takes here
+            arm.send(name, position=[0.0, 0.0])
 
 
 def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
