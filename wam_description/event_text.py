@@ -162,7 +162,7 @@ def _digits(values: Mapping[str, Any]) -> int:
 
 def sentences(events: Iterable[Event]) -> str:
     """Several events in words, each once."""
-    return "; ".join(filter(None, dict.fromkeys(map(sentence, events))))
+    return "; also: ".join(filter(None, dict.fromkeys(map(sentence, events))))
 
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:

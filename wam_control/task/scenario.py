@@ -39,8 +39,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force on the world, N, in `base` or in the "
-    "frame of a cover. Optional: `contact_position`, where it acts, m along the cover, for a force across the cover, "
-    "in its frame; `rise`, its rise time, s",
+    "frame of a cover. Optional: `contact_position`, m along the cover, for a force across it in its frame; `rise`, "
+    "its rise time, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "the torque of each joint on the world, N m; it is sent as a `task`",
     "until_force": "force, N; the step ends when a contact with this force is detected, and fails without one",
