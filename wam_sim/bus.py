@@ -21,7 +21,6 @@ class TopicValue(NamedTuple):
 
 
 Rows = dict[str, list[TopicValue]]
-SMALLEST_BLOCK, LARGEST_BLOCK = 8, 2048  # messages: what comes in few takes little, what goes on is seldom begun again
 
 
 class Bus:
@@ -97,9 +96,9 @@ _Row = list[Any]  # stamp and numbers of a message
 
 
 class _Kept:
-    """The numbers of the messages of one topic, packed into blocks, each of messages of one length and frame.
+    """The numbers of the messages of one topic, each packed, in blocks of messages of one length and frame.
 
-    As objects they would take four times the memory, and drive those in use out of the processor's caches
+    As objects they would take three times the memory, and drive those in use out of the processor's caches
     (benchmarks/README.md).
 
     Parameters
@@ -108,45 +107,33 @@ class _Kept:
     is_framed : whether messages have a frame.
     """
 
-    __slots__ = ("_block", "_blocks", "_count", "_end", "_frame", "_is_framed", "_layout", "_pack", "_row", "_size")
+    __slots__ = ("_blocks", "_count", "_frame", "_is_framed", "_keep", "_pack", "_row")
 
     def __init__(self, row: Callable[[int, Any], _Row], is_framed: bool) -> None:
         self._row, self._is_framed = row, is_framed
-        self._blocks: list[tuple[str, Struct, bytearray]] = []
-        self._count = self._end = 0
-        self._block, self._frame = bytearray(), ""
+        self._blocks: list[tuple[str, Struct, list[bytes]]] = []
+        self._count, self._frame = 0, ""
 
     def add(self, stamp: int, value: Any) -> None:
         """Keep the numbers of a message."""
         row = self._row(stamp, value)
         if len(row) != self._count or (self._is_framed and value.frame != self._frame):
-            self._close()
-            self._count, self._frame = len(row), value.frame if self._is_framed else ""
-            self._layout = Struct(f"q{self._count - 1}d")
-            self._pack, self._size = self._layout.pack_into, self._layout.size
-            self._begin(SMALLEST_BLOCK)
-        elif self._end == len(self._block):
-            self._begin(min(2 * len(self._block) // self._size, LARGEST_BLOCK))
-        self._pack(self._block, self._end, *row)
-        self._end += self._size
+            self._begin(len(row), value.frame if self._is_framed else "")
+        self._keep(self._pack(*row))
 
-    def _begin(self, messages: int) -> None:
-        """Begin a block of so many messages."""
-        self._block, self._end = bytearray(messages * self._size), 0
-        self._blocks.append((self._frame, self._layout, self._block))
-
-    def _close(self) -> None:
-        """Leave off what is empty of the last block."""
-        del self._block[self._end :]
+    def _begin(self, count: int, frame: str) -> None:
+        """Begin a block of messages of so many numbers."""
+        layout, messages = Struct(f"q{count - 1}d"), list[bytes]()
+        self._blocks.append((frame, layout, messages))
+        self._count, self._frame, self._pack, self._keep = count, frame, layout.pack, messages.append
 
     def taken(self) -> list[TopicValue]:
         """The messages since the last call."""
-        self._close()
         blocks, self._blocks, self._count = self._blocks, [], 0
         return [
             TopicValue(stamp, tuple(values), frame)
-            for frame, layout, block in blocks
-            for stamp, *values in layout.iter_unpack(block)
+            for frame, layout, messages in blocks
+            for stamp, *values in map(layout.unpack, messages)
         ]
 
 

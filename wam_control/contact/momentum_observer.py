@@ -176,7 +176,9 @@ class MomentumObserver:
             # map and a plain zip: strict=True takes as long as the work on four numbers
             rates = [change / span for change in map(sub, momentum, last.momentum)]
             model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
-            left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
+            left = model
+            if friction:
+                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
             external, qdd = list(map(sub, left, tau)), [change / span for change in map(sub, qd, last.qd)]
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
