@@ -56,8 +56,6 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
 }
 INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
     ("torques", "sensors"): "raise limits.tolerance, or command fewer forces at once",
-    ("shaking_arm", "sensors"): "end the dither (timing.dither_cycle=0), or set guard.contact_stiffness to that of the "
-    "surface",
     ("place", "pinned"): "bend the arm, or lower contact_position_sd if the position is known better",
 }
 UNKNOWN: Final = "{desired:.3g} {unit} at {where} cannot be controlled because of {part_text}"

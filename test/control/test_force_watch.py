@@ -14,6 +14,7 @@ from wam_control.force.belief import Belief, Errors
 from wam_control.force.force_watch import ForceWatch, MotionWatch, Seen
 from wam_control.task.motion import GoalMotion
 from wam_description.event import Code, Event
+from wam_description.event_text import sentence
 
 DT, FORCE = 0.005, 5.0
 AXIS = axis_at(POSES[0], FORCE)
@@ -186,6 +187,22 @@ def test_an_oscillation_is_reported_with_its_size_and_ends_and_the_arm_is_slowed
     assert event.values["period"] == pytest.approx(0.2, rel=0.02)
     assert pressed.watch.oscillation.share == 0.25
     assert pressed.last(2.0 * SETTLING + 0.1) == []
+
+
+@pytest.mark.parametrize(("feedback", "is_used"), [("joint_sensors", True), ("contact_estimate", False)])
+@pytest.mark.parametrize("error", [0.0, 0.9, math.inf])
+def test_joint_sensors_are_advised_where_they_are_not_used_and_a_tare_only_where_it_helps(
+    error: float, feedback: str, is_used: bool
+) -> None:
+    pressed = Pressed()
+    pressed.own = replace(OWN, feedback=feedback)
+    pressed.go(0.5, FORCE, error)
+    event = pressed.go(SETTLING, swing(0.4), error)[-1][0]
+    assert event.code is (Code.REFUSED if error else Code.OSCILLATING)
+    text = sentence(event)
+    assert "use joint sensors" in text if not is_used else "joint sensors" not in text
+    assert "tare" not in text
+    assert ("cannot be controlled" in text) == math.isinf(error)
 
 
 def test_a_force_that_follows_a_sine_of_its_set_point_is_no_oscillation() -> None:
