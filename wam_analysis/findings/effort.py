@@ -29,10 +29,9 @@ def effort_section(recording: AnalysedRecording) -> Section:
         unlike = contradiction(one)
         wrong += _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
-        whole = friction(one) if one.is_joint and not unlike else None
-        found = None if whole is None else whole.friction
-        if whole is None or found is None or not whole.is_known:
-            if found is not None and found.dynamic.is_negative:
+        found, lag = friction(one) if one.is_joint and not unlike else (Friction(), 0.0)
+        if not _is_known(found):
+            if found.dynamic.is_negative:
                 wrong.append(f"{one.label}: {BELOW_ZERO.format(shown(found.dynamic.value, one.units['effort']))}")
             elif not unlike and {"effort"} < one.values.keys() and not rests(one):
                 doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
@@ -53,12 +52,11 @@ def effort_section(recording: AnalysedRecording) -> Section:
         missing = [what for what, _, known in every if not (math.isnan(known.value) or known.is_sure)]
         remarks = [unexplained]
         if math.isnan(found.inertia.value):
-            late = shown(1e-3 * abs(whole.per_lag))
-            remarks.append(f"it moved at one frequency, where each ms of delay changes the viscous friction by {late}")
             alone.append(one.label)
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
-        way = "behind" if whole.lag > 0.0 else "before"
-        remarks += [f"the effort is {shown(abs(whole.lag), 's')} {way} the motion"] * bool(whole.lag)
+        remarks += [f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion"] * bool(
+            lag
+        )
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not sentences:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
@@ -156,30 +154,16 @@ def _velocity_factor(some: Sequence[Piece]) -> float:
     return math.nan if abs(factor - 1.0) <= SHAFT.agree else factor
 
 
-class FoundFriction(NamedTuple):
-    """Friction and inertia of a joint.
-
-    Attributes
-    ----------
-    friction : fitted with the weight and the drag that its effort may also hold.
-    lag : s, of the effort behind the motion.
-    per_lag : how the viscous friction changes where the effort of a motion of one frequency is later, per s; NaN of
-        other motions.
-    """
-
-    friction: Friction
-    lag: float
-    per_lag: float
-
-    @property
-    def is_known(self) -> bool:
-        """Whether a friction is identified, and nothing comes out below zero, as where the effort holds more."""
-        dynamic, viscous, inertia = self.friction.dynamic, self.friction.viscous, self.friction.inertia
-        return (dynamic.is_sure or viscous.is_sure) and not any(one.is_negative for one in (dynamic, viscous, inertia))
+def _is_known(found: Friction) -> bool:
+    """Whether a friction is identified, and nothing comes out below zero, as where the effort holds more."""
+    numbers = found.dynamic, found.viscous, found.inertia
+    return any(one.is_sure for one in numbers[:2]) and not any(one.is_negative for one in numbers)
 
 
-def friction(source: Source) -> FoundFriction | None:
-    """Friction and inertia of a joint that its weight may load; None without effort or velocity.
+def friction(source: Source) -> tuple[Friction, float]:
+    """Friction and inertia of a joint that its weight may load, and by how much its effort lags behind the motion, s.
+
+    Nothing is known without effort or velocity.
 
     The recorded velocity must be the rate of the position, see `contradiction`.
 
@@ -193,7 +177,7 @@ def friction(source: Source) -> FoundFriction | None:
         source, needed = loaded, ["velocity", "effort"]
     some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
     if not some:
-        return None
+        return Friction(), 0.0
     period = float(some[0].time[1] - some[0].time[0])
     window = max(SHAFT.window, SHAFT.window_samples * period)
     # samples between two pieces
@@ -209,7 +193,7 @@ def friction(source: Source) -> FoundFriction | None:
     load = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])] if has_weight else [0.0 * velocity])
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     trial = _Trial(velocity, joined["effort"], load, rest, window, period)
-    width, per_lag = round(window / period), math.nan
+    width = round(window / period)
     own, noise = _own_acceleration(velocity, sd, load, rest, width, period)
     one_frequency = has_weight and own < SHAFT.apart
     found, shift = (trial.fit(0), 0) if one_frequency else trial.best()
@@ -218,9 +202,7 @@ def friction(source: Source) -> FoundFriction | None:
         by_rate = trial._replace(velocity=np.concatenate(rates)).best()
         found, shift = min((found, shift), by_rate, key=lambda one: one[0].residual)
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
-    if one_frequency:
-        per_lag, inertia = (found.viscous.value - trial.fit(1).viscous.value) / period, UNKNOWN
-    return FoundFriction(found._replace(inertia=inertia), shift * period, per_lag)
+    return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 
 
 class _Trial(NamedTuple):

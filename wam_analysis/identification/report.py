@@ -102,8 +102,3 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
                 f"{name}: {1e3 * found.residual[i]:.3g} mN m remain unexplained, {share:.0%} of its friction: "
                 "was the motion free of contact?"
             )
-    offset = level[0] - level[1]
-    sums = level.sum(0)
-    for i, name in enumerate(shared.arm.motors.names):
-        if abs(offset[i]) > 0.3 * sums[i] / 2.0:
-            yield f"{name}: directions differ by {abs(offset[i]):.3g} N m; a torque offset of half of it looks the same"
