@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import CONFIGURATION, changed
+from arms import WAM as ELASTIC
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
@@ -16,6 +17,7 @@ from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import State
 
+WAM = changed(ELASTIC, cables={"stage_ea": tuple(1e3 * each for each in ELASTIC.cables.stage_ea)})  # as `RigidArm`
 NOMINAL = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
 EXACT = dataclasses.replace(NOMINAL, mass_scale=(1.0,) * 4, friction_scale=1.0, payload=(0.0, 0.0))
 KNOWN = dataclasses.replace(
@@ -148,6 +150,29 @@ def test_rotor_inertia_is_part_of_the_momentum() -> None:
         worst[name] = np.abs(rows).max()
     assert worst["with"] < 0.05
     assert worst["without"] > 0.3
+
+
+@pytest.mark.slow
+def test_the_stretch_of_cables_is_no_external_torque() -> None:
+    """At 12 Hz; the motors are ahead of the links by the torque of the cables over their stiffness."""
+    stiffness, rotor = [circuit.stiffness for circuit in ELASTIC.circuits], ELASTIC.motors.inertia[0]
+    worst = {}
+    for name, model in (("with", ELASTIC), ("without", WAM)):
+        plant = RigidArm(changed(WAM, motors={"inertia": (1e-9,) * 4}), POSE, friction=0.0)
+        observer, rows, stretch, speed = MomentumObserver(model, FREE, False), [], np.zeros(4), np.zeros(4)
+        for k in range(300):
+            drive = np.array([12.0, 16.0, 3.0, 4.0]) * math.cos(24.0 * math.pi * k * DT)
+            cable = np.linalg.solve(DRIVE, drive + plant.gravity())
+            plant.step(cable, NONE)
+            before, stretch, last = stretch, cable / stiffness, speed
+            speed = motor_from_joint(plant.data.qvel) + (stretch - before) / DT
+            motor = cable + rotor * (speed - last) / DT
+            angle = motor_from_joint(plant.data.qpos) + stretch
+            assert observer.observe(State(angle.tolist(), speed.tolist(), motor.tolist()), DT)
+            rows.append(observer.torques()[0])
+        worst[name] = np.abs(rows[200:]).max(axis=0)
+    assert np.all(worst["with"] < 0.3 * worst["without"])
+    assert np.all(worst["without"] > 0.1)
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import ErrorEffects, FilteredMotion, GaugeEffects, LinkEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
-from wam_control.contact.motor_side import MotorSide
+from wam_control.contact.motor_side import LinkMotion, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
@@ -35,10 +35,10 @@ class MomentumObserver:
     r' = (tau_ext - r) / T.  Solved exactly over a period in which the torques are constant:
     r_k = a r_(k-1) + (1 - a) ((p_k - p_(k-1)) / dt - known torques), a = exp(-dt / T).
 
-    Motor side: cables assumed rigid, q = M theta (A.5); the momentum includes rotors, reflected
-    through (A.5), and pulleys; Coulomb friction has the sign of each motor's velocity, that of the
-    joints the sign of the joint's.  Link side (joint sensors): links alone, tau is the strain torque,
-    measured after the friction.  Motor torques are those that acted in the period that ends.
+    Motor side: q = M theta (A.5); the links move as the motors drive them through their cables (`LinkMotion`).  The
+    momentum includes rotors, reflected through (A.5), and pulleys.  Coulomb friction has the sign of each motor's
+    velocity, that of the joints the sign of the joint's.  Link side (joint sensors): links alone, tau is the strain
+    torque, measured after the friction.  Motor torques are those that acted in the period that ends.
 
     The error of friction is a bias, not noise: a wrong level stays wrong in every sample, with the
     sign of the motion.  So the signed fraction of Coulomb friction, and the fraction of the time that
@@ -165,10 +165,16 @@ class MomentumObserver:
     ) -> bool:
         """Take a sample of the joints, see `JointSample`."""
         body, at, speed, last = self._body, np.array(q), np.array(qd), self._last
-        inertia = body.mass_matrix(at) if self._is_link_side else body.mass_matrix(at) + self._side.inertia
-        momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
+        span, inertia, links = dt + self._gap, body.mass_matrix(at), None
+        if self._is_link_side:
+            momentum = inertia.dot(speed).tolist()
+        else:
+            rotors, driven = self._side.rotors, inertia + self._side.pulleys
+            links = self._side.links(driven, speed, last.links, span)
+            momentum = (links.momentum + rotors.dot(speed)).tolist()
+            inertia, speed, qd = driven + rotors, links.velocity, links.velocity.tolist()
+        bias = body.momentum_bias(at, speed).tolist()
         known = list(map(sub, bias, friction)) if friction else bias
-        span = dt + self._gap
         is_first = not self._filters.count
         if is_first:
             external, model, qdd = [0.0] * self._n, [-torque for torque in bias], [0.0] * self._n
@@ -185,8 +191,8 @@ class MomentumObserver:
             return False
         present = np.array([*external, *model, *q, *qd, *qdd])
         self._filters.take(np.concatenate((present, signals)) if friction else present, span)
-        self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias), 0.0
-        # releasing the brakes gives a jolt that a model with rigid cables does not predict;
+        self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias, links), 0.0
+        # releasing the brakes gives a jolt that the model does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
         settled = CONTACT.settled * self._parameters.time_constant
@@ -280,6 +286,7 @@ class _Sample:
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
+    links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
     def __init__(
@@ -290,8 +297,10 @@ class _Sample:
         inertia: Array,
         known: list[float],
         bias: list[float],
+        links: LinkMotion | None = None,
     ) -> None:
         self.q, self.qd, self.momentum, self.inertia, self.known, self.bias = q, qd, momentum, inertia, known, bias
+        self.links = links
 
 
 class _Filters:

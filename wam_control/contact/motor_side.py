@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import EQUAL, ShaftFriction
+from wam_control.contact.thresholds import CONTACT
 from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
@@ -31,6 +32,23 @@ class JointSample(NamedTuple):
     dt: float
 
 
+class LinkMotion(NamedTuple):
+    """Links that move as the motors drive them through their cables: M q'' = t, t = K (e + b e'), e' = q_m' - q'.
+
+    The motion of the motors shows it without any torque, so that their friction does not count.  What else stretches
+    the cables, such as weights, changes slowly.
+
+    Attributes
+    ----------
+    velocity, momentum : (n,), q', rad/s, and M q', N m s, with pulleys.
+    torque : (n,), K e, of the cables at the joints, N m.
+    """
+
+    velocity: Array
+    momentum: Array
+    torque: Array
+
+
 class MotorSide:
     """Rotors and cables between the motors and the joints.
 
@@ -46,13 +64,14 @@ class MotorSide:
     map : between motors and joints.
     is_identified : whether the model is that of a recording.
     friction : of motors, then joints.
-    inertia : (n, n), of rotors and pulleys at the joints, kg m^2.
+    rotors, pulleys : (n, n), their inertia at the joints, kg m^2.
     """
 
     def __init__(self, arm: Arm, parameters: ObserverParameters, has_dither: bool, model: ArmModel | None) -> None:
         self.map = TransmissionMap.of(arm)
         self._squared = np.square(self.map.joint_from_motor)
-        self.inertia: Array = self.map.at_joints(arm.motors.inertia) + np.diag(arm.joints.armature)
+        self.rotors, self.pulleys = self.map.at_joints(arm.motors.inertia), np.diag(arm.joints.armature)
+        self._stiffness = self.map.at_joints([circuit.stiffness for circuit in arm.circuits])
         self.is_identified = model is not None and model.is_identified
         self.friction = ShaftFriction(arm, parameters, model)
         self._velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
@@ -83,6 +102,23 @@ class MotorSide:
         """Take a state of the motors `dt` seconds after the one before; None while velocities are not known."""
         fitted = self._velocity.take(state, dt)
         return None if fitted is None else self._sample(fitted.state, fitted.dt)
+
+    def links(self, inertia: Array, driven: Array, before: LinkMotion | None, dt: float) -> LinkMotion:
+        """Motion of the links, `dt` seconds after the one before, in an implicit step.
+
+        Parameters
+        ----------
+        inertia : (n, n), of links and pulleys, kg m^2.
+        driven : velocity of the motors at the joints, (n,), rad/s.
+        before : None for links that move as the motors do.
+        """
+        if before is None:
+            return LinkMotion(driven, inertia.dot(driven), np.zeros(len(driven)))
+        lasts = dt + CONTACT.cable_damping
+        given, held = before.momentum + dt * before.torque, dt * lasts * self._stiffness
+        velocity = np.linalg.solve(inertia + held, given + held.dot(driven))
+        momentum = inertia.dot(velocity)
+        return LinkMotion(velocity, momentum, before.torque + (momentum - given) / lasts)
 
     def _sample(self, state: State, dt: float) -> JointSample:
         theta, thetad, tau_motor = state

@@ -91,6 +91,9 @@ class ContactThresholds:
     rest_noise: float = 3.0  # sd of the measured velocity that the rest velocity is at least
     # of the cycle of a dither, in which a shaft that slips in both directions has surely been at both its limits
     slips_both_ways: float = 0.25
+    # s, damping of cables over their stiffness, of the links that the motors drive: more than cables have, as the
+    # modelled vibration would soon be out of phase with theirs
+    cable_damping: float = 3e-3
     # velocity of a motor
     half_windows: tuple[int, ...] = (0, 1, 2, 4)  # samples on each side of the fitted one
     longest_window: float = 0.0081  # s, of a window: motion is nearly uniform in it
