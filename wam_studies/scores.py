@@ -47,7 +47,8 @@ def share(hits: int, count: int) -> Interval:
     p, z2 = hits / count, Z * Z
     centre = (p + z2 / (2.0 * count)) / (1.0 + z2 / count)
     half = Z * math.sqrt(p * (1.0 - p) / count + z2 / (4.0 * count * count)) / (1.0 + z2 / count)
-    return Interval(p, max(0.0, centre - half), min(1.0, centre + half), count)
+    # at its ends without the rounding
+    return Interval(p, centre - half if hits else 0.0, centre + half if hits < count else 1.0, count)
 
 
 def quantile(values: Sequence[float], level: float) -> Interval:
