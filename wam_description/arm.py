@@ -121,9 +121,8 @@ class Arm:
             x = _turned_x(cover.rotation)
             ends = [start + cover.length * along for start, along in zip(cover.origin, x, strict=True)]
             link = links.index(cover.link)
-            coupled = (
-                f"; a longer {cover.name} changes arm.covers.length and end, {{}}, and arm.links.mass, centre, inertia"
-            )
+            coupled = f"; another length of {cover.name} changes arm.covers.length and end, {{}}, "
+            coupled += "and arm.links.mass, centre, inertia"
             if link + 1 < len(links):
                 following = joints[link + 1]
                 twist, offset, name = following.twist, following.offset, following.name

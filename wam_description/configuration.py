@@ -184,7 +184,7 @@ class Configuration(NamedTuple):
             return build(cls, self.sections[section])
         except ParameterError as error:
             where = f"section '{SHARED if section == SHARED else f'/**/{section}'}'"
-            given = "a value that you gave (as with --set)" if self._file_is_right(section, cls) else self.path
+            given = "a value that you set" if self._file_is_right(section, cls) else self.path
             raise ParameterError(f"{given}, {where}: {error}") from error
 
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:

@@ -21,9 +21,9 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the estimate assumes a force across this link; the torques also fit one along it, on it or on "
-    "the link before",
-    Reason.PAYLOAD: "a picked-up payload may explain the torques; its probability is 1 minus those of the links",
+    Reason.ALONG: "the estimate assumes a force across this link; the torques also fit one along the tube, on this "
+    "link or on the one before it",
+    Reason.PAYLOAD: "a picked-up payload may explain the torques; its probability is the rest to 1",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "the arm is braked",
 }
@@ -77,11 +77,11 @@ SENTENCES: Final = {  # by cause
     "other_link": "{touched} is touched, but the force is commanded on {cover}: command it on {touched}, or free the "
     "arm; until the command ends, the arm goes back to where it was free",
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
-    "(limits.free_travel): end the command, then begin again",
+    "(limits.free_travel): end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
-    "measured: command a force that the arm can reach, or bend the arm",
+    "measured: {reach}",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
     "{measured:.3g} {unit} are measured, {desired:.3g} {unit} are commanded; the surface moves, something else pushes, "
     "or the friction of the surface has changed its direction",
@@ -123,6 +123,10 @@ SENTENCES: Final = {  # by cause
 }
 HOLDING: Final = "; the arm holds its position"
 SINCE: Final = ("without a contact", "since the force was last right or rising")
+REACH: Final = (
+    "no contact is seen: bring the arm to the surface first, command more force, or bend the arm",
+    "command a force that the arm can reach, or bend the arm",
+)
 CALM: Final = ("lower force_gain", "lower force_gain, or use joint sensors")
 
 
@@ -165,7 +169,8 @@ def sentences(events: Iterable[Event]) -> str:
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     """What the placeholders of a sentence stand for that are no values."""
-    found = {"since": SINCE[values.get("has_touched", 0.0) > 0.0], "calm": CALM[values.get("source") == "motors"]}
+    has_touched, is_motors = values.get("has_touched", 0.0) > 0.0, values.get("source") == "motors"
+    found = {"since": SINCE[has_touched], "reach": REACH[has_touched], "calm": CALM[is_motors]}
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         helps = INSTEAD.get((values["part"], values["source"]), helps)

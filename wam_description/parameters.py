@@ -227,7 +227,7 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         parts = [f"missing parameter '{name}'" for name in missing]
         parts += [f"unknown parameter '{name}'" for name in unknown]
         listed_in = "docs/parameters.md" if cls.__module__.startswith("wam_") else f"the class {cls.__qualname__}"
-        raise ParameterError(f"{'; '.join(parts)}; all are in {listed_in}")
+        raise ParameterError(f"{'; '.join(parts)}; {listed_in} lists what there is")
     return _assemble(cls, {name: checked(field, flat[name]) for name, field in known.items()}, "")
 
 

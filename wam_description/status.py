@@ -96,7 +96,7 @@ def guidance(
     if mode == "braked" and waits:
         return f"braked; {'; '.join(waits)}"
     if mode == "braked" and faulty:
-        return f"braked; a fault is reported by {', '.join(faulty)}: enable is refused until it is over"
+        return f"braked; a fault is reported by {', '.join(faulty)}: enable is refused until the fault is over"
     if mode == ENABLED:
         return "enabled: the motors follow the commands"
     if is_played or (mode == "braked" and before == ENABLED):

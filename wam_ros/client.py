@@ -139,6 +139,10 @@ class StackClient(Closing):
         NoAnswerError
             where it does not answer, or there is no such node.
         """
+        if not node.isidentifier():
+            raise NoAnswerError(
+                f"'{node}' is no name of a node; name a parameter with its node, as force_loop:force_gain"
+            )
         requested = RemoteParameters(self.node, [node])
         self._require(requested.complete, f"no node '{node}' answers", lambda: self._nodes_without(node))
         return requested.found[node]

@@ -328,7 +328,10 @@ class RunningArm:
 
     def value(self, topic: str, **fields: Any) -> Any:
         """A value of a topic; what is not given is empty or zero."""
-        return _EMPTY[self._row(topic).type]._replace(**fields)
+        empty = _EMPTY[self._row(topic).type]
+        if unknown := fields.keys() - set(empty._fields):
+            raise ValueError(f"'{topic}' has no field '{min(unknown)}'; it has {', '.join(empty._fields)}")
+        return empty._replace(**fields)
 
     def _row(self, topic: str) -> Topic:
         """The row of a topic."""

@@ -221,7 +221,7 @@ def test_a_section_may_be_empty(tmp_path: Path) -> None:
     assert Configuration.load(path).sections == WAM.sections
 
 
-IN_PLACE = "a value that you gave (as with --set), section '/**': "
+IN_PLACE = "a value that you set, section '/**': "
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_values_that_do_not_fit_each_other_are_refused_with_the_others_to_change
     with pytest.raises(ParameterError) as refused:
         _ = WAM.with_values(values).shared
     assert message in str(refused.value)
-    assert ("a longer " in str(refused.value)) == next(iter(values)).startswith("arm.")
+    assert ("another length of " in str(refused.value)) == next(iter(values)).startswith("arm.")
 
 
 def test_values_at_their_bounds_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:

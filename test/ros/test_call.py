@@ -118,6 +118,7 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
         there = set(err.partition("; there are ")[2].strip().split(", "))
         assert ({"joint_states", "status"} if words[0] == "echo" else {"driver", "force_loop"}) <= there
         assert "wam_call" not in there
+    assert "'timing.period' is no name of a node" in called("get", "timing.period")[2]
     with StackClient("wam") as here:
         refused = here.request(Call("nosuch", "tare"), 3.0).message
         lacks = here.request(Call("driver", "nosuch"), 3.0).message

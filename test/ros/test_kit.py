@@ -74,6 +74,8 @@ def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningAr
     ):
         with pytest.raises(ValueError, match=reason):  # which no node takes here
             arm.send(name, position=[0.0, 0.0])
+    with pytest.raises(ValueError, match="no field 'positions'; it has position, velocity, effort"):
+        arm.send("joint_posture_command", positions=[0.0])
 
 
 def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
@@ -152,7 +154,7 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
         ({"driver": {"watchdogg": 1.0}}, "did you mean"),
         ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
         ({"timing": {"period": -1.0}}, "period"),
-        ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you gave .*damping.*gan"),
+        ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you set.*damping.*gan"),
         ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
     ],
 )

@@ -115,7 +115,8 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
         yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
     yield from (f"{name}: {reason}." for reason in contact.estimate.reasons)
     if contact.true not in ("", contact.estimate.link):
-        yield f"{name}: {'nothing was' if contact.true == NO_LINK else f'{contact.true} was'} touched."
+        touched = "a false detection, nothing" if contact.true == NO_LINK else contact.true
+        yield f"{name}: {touched} was touched."
 
 
 def _errors(away: float, off: float) -> str:

@@ -23,7 +23,7 @@ from wam_theory.verdicts import Verdict
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
 WHOSE = "Measured force: that of the force loop. Estimated force: that of the contact estimator."
 NOT_APPLIED, ELSE = "Not applied, the arm held its position", "Reported by the force loop"
-NO_FORCE = f"No constant force was commanded for {HOLD.shortest:g} s"
+NO_FORCE = f"No commanded force was constant for {HOLD.shortest:g} s or longer"
 
 
 def force_section(recording: AnalysedRecording) -> Section:

@@ -231,6 +231,6 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
         if not ended and not stop.is_set:
             failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
         for failure in failures:  # before the others end and print what follows from it
-            print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
+            print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
         close_page()
     return PlayedDemo([*failures, *([stack.bag_failure] if stack.bag_failure else [])], stop.is_set)

@@ -76,7 +76,7 @@ def run(given: argparse.Namespace) -> int:
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
         failures = stack.failures
         for failure in failures:  # before the others end and print what follows from it
-            print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
+            print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
         close_page()
     for node, code in ended.items():
         if not code:
@@ -86,7 +86,7 @@ def run(given: argparse.Namespace) -> int:
         record = "" if given.record else "play it with --record, then "
         print(f"played; to see whether its commands were carried out: {record}'wam analyse BAG --steps'")
     for failure in failures:
-        print(f"error: {failure}; all others were stopped", file=sys.stderr)
+        print(f"error: {failure}; all nodes are stopped", file=sys.stderr)
     if stack.bag_failure:
         print(f"error: {stack.bag_failure}", file=sys.stderr)
     return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed or stack.bag_failure))
