@@ -26,8 +26,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
     states = recording.states
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
     for one in states:
-        unlike = contradiction(one)
-        wrong += _limited(one)
+        unlike = contradiction(one) or _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
         found, lag = friction(one) if one.is_joint and not unlike else (Friction(), 0.0)
         if not _is_known(found):
@@ -74,18 +73,15 @@ def effort_section(recording: AnalysedRecording) -> Section:
     return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, (), brief, wrong)
 
 
-def _limited(source: Source) -> list[str]:
-    """That an effort stays at its bounds for long, which no friction with its noise does."""
+def _limited(source: Source) -> str:
+    """That an effort stays at its bounds for long, which no friction with its noise does; '' where it does not."""
     effort = source.only("effort").values.get("effort", np.zeros(0))
     bounds = (float(np.min(effort, initial=math.inf)), float(np.max(effort, initial=-math.inf)))
     share = float(np.mean(np.isin(effort, bounds))) if bounds[0] < bounds[1] else 0.0
     if share < SHAFT.limited:
-        return []
+        return ""
     low, high = (shown(bound, source.units["effort"]) for bound in bounds)
-    when = f"in {100.0 * share:.0f} % of the messages"
-    return [
-        f"{source.label}: its effort is exactly {low} or {high} {when}, as if it was limited: its friction is wrong."
-    ]
+    return f"the effort is exactly {low} or {high} in {100.0 * share:.0f} % of the messages, as if it was limited"
 
 
 def contradiction(source: Source) -> str:
