@@ -672,7 +672,7 @@ def test_empty_bag_gives_a_report():
     empty = Bag(Path("bag"), {}, {}, {}, {})
     summary = AnalysedRecording(empty)
     assert "NOT EVALUATED" in verdict(summary)
-    assert "No constant force was commanded" in told(empty)
+    assert "No commanded force was constant" in told(empty)
 
 
 def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
