@@ -53,9 +53,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if math.isnan(found.inertia.value):
             alone.append(one.label)
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
-        remarks += [f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion"] * bool(
-            lag
-        )
+        if lag:
+            remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not sentences:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."

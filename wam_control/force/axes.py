@@ -88,7 +88,7 @@ class TaskAxes:
         places : where each axis acts.
         sides : 1 or -1, where along its direction each impedance touches; those of forces follow from their sign.
         """
-        rotation = UNTURNED if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
+        rotation = self.rotation(q, task.frame)
         signs = [
             (-1.0 if (axis.value or 0.0) < 0.0 else 1.0) if axis.kind is AxisKind.FORCE else side
             for axis, side in zip(task.axes, sides, strict=True)
@@ -105,6 +105,10 @@ class TaskAxes:
             self._axis(q, i, task.axes, directions[i], in_frame[i], pressed[i], torques, places[i])
             for i in range(len(task.axes))
         ]
+
+    def rotation(self, q: Sequence[float], frame: str) -> Array:
+        """Rotation (3, 3) of the frame of a command into the base frame."""
+        return UNTURNED if frame == BASE else self._body.cover_pose(q, frame).rotation
 
     def _disturbance(self, q: Sequence[float], axis: TaskAxis, pressed: PressedForce) -> list[Array]:
         """Torques (n,), N m, by which a force along an axis disturbs the others; a hand has no friction."""

@@ -20,7 +20,7 @@ from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief, WorldTorques
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
-from wam_control.force.force_axis import UNTURNED, ForceAxes
+from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, Commands, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.force_measurement import ForceMeasurement
@@ -301,9 +301,9 @@ class ForceLoop:
         if axis.joint >= 0:
             return ForcePlace("", 0.0, 0.0)
         if contact.cover and axis.position is None:
-            turn = UNTURNED if task.frame == BASE else self._body.cover_pose(self._q, task.frame).rotation
-            along = self._body.cover_pose(self._q, contact.cover).rotation[:, 0]
-            lean = math.asin(min(abs(float(turn @ np.array(axis.direction) @ along)), 1.0))
+            direction = self._axes.rotation(self._q, task.frame).dot(np.array(axis.direction))
+            along = self._axes.forces.link_axis(self._q, contact.cover)
+            lean = math.asin(min(abs(float(direction.dot(along))), 1.0))
         place = memory.step(axis, contact, lean, self.parameters)
         self._run.fallback = place.rejection
         return place
