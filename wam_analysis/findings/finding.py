@@ -42,6 +42,11 @@ class Finding(NamedTuple):
         return self.name.rpartition(": ")[2]
 
     @property
+    def title(self) -> str:
+        """Of its row or column: the quantity with its unit."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+    @property
     def deviates(self) -> bool:
         """Whether it differs from its prediction by more than three standard errors."""
         if self.is_ideal:

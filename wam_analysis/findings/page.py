@@ -9,7 +9,7 @@ from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section
 from wam_analysis.findings.plots import arm_plot
-from wam_analysis.findings.tabulated import LEGENDS, MARK, Tabulated, tabulated
+from wam_analysis.findings.tabulated import MARK, Table, legends, tabulated
 from wam_bag.losses import PARAMETERS
 
 # no network access, whatever is in the bag; only the scripts of this page run
@@ -48,7 +48,6 @@ table.numbers { border-collapse: collapse; margin: 12px 0 0; font-size: 0.9rem; 
 .numbers td { border-bottom: 1px solid var(--line); text-align: right; font-variant-numeric: tabular-nums; }
 .numbers th, .numbers td { padding: 4px 0 4px 14px; max-width: 11em; overflow-wrap: normal; }
 .numbers th:first-child, .numbers td:first-child { text-align: left; padding-left: 0; max-width: 20em; }
-.numbers .predicted { color: var(--faint); font-weight: 400; }
 .numbers .deviates { color: var(--bad); font-weight: 600; }
 small, .lacking { color: var(--faint); }
 summary { cursor: pointer; margin-top: 12px; color: var(--link); }
@@ -122,7 +121,8 @@ def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
     lacking = ""
     if section.lacking:
         lacking = f'<p class="lacking"><small>Not in this bag: {html.escape(", ".join(section.lacking))}.</small></p>'
-    tables = "".join(_table(table) for table in tabulated(section.findings))
+    numbers = tabulated(section.findings)
+    tables = "".join(map(_table, numbers)) + "".join(f"<p><small>{text}.</small></p>" for text in legends(numbers))
     return (
         f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2><ul>{sentences}</ul>'
         f"{tables}{_notes(section.findings)}{figures}{lacking}</section>"
@@ -139,22 +139,14 @@ def _chart(number: int, chart: Chart) -> str:
     return f'<figure class="chart" data-chart="{number}"><div></div><figcaption>{caption}</figcaption></figure>'
 
 
-def _table(table: Tabulated) -> str:
-    def cells(row: tuple[str, ...], tag: str) -> str:
-        kinds = [
-            " ".join(filter(None, ("predicted" if is_predicted else "", "deviates" if text.endswith(MARK) else "")))
-            for text, is_predicted in zip(row, table.predicted, strict=True)
-        ]
-        return "".join(
-            f"<{tag}{f' class={chr(34)}{kind}{chr(34)}' if kind else ''}>{html.escape(text)}</{tag}>"
-            for text, kind in zip(row, kinds, strict=True)
-        )
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{html.escape(title)}</th>" for title in table[0])
+    rows = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table[1:])
+    return f'<div class="wide"><table class="numbers"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
-    rows = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in table.rows)
-    marked = [text for mark, text in LEGENDS.items() if any(mark in cell for row in table.rows for cell in row)]
-    legend = "".join(f"<p><small>{text}.</small></p>" for text in marked)
-    head = f"<thead><tr>{cells(table.columns, 'th')}</tr></thead>"
-    return f'<div class="wide"><table class="numbers">{head}<tbody>{rows}</tbody></table></div>{legend}'
+
+def _cell(text: str) -> str:
+    return f"<td{' class=deviates' * (MARK in text)}>{html.escape(text)}</td>"
 
 
 def _notes(findings: Sequence[Finding]) -> str:

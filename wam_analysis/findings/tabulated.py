@@ -1,7 +1,6 @@
 """The numbers of a section as tables: subjects by quantities, and a list of the rest."""
 
-from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -9,35 +8,32 @@ from wam_analysis.findings.finding import Finding, shown
 
 MARK = " !"  # after a number more than three standard errors from its prediction
 BESIDE = " +- "  # before its standard error
-LEGENDS = {BESIDE: "+-: one standard deviation", MARK: "! more than three standard errors from its prediction"}
+PREDICTED = " | "  # before its prediction
+LEGENDS = {
+    BESIDE: "+-: one standard deviation",
+    PREDICTED: "measured | predicted",
+    MARK: "! more than three standard errors from its prediction",
+}
+
+Table = Sequence[Sequence[str]]  # its first row has the titles; '' where nothing belongs, '-' where nothing is known
 
 
-class Tabulated(NamedTuple):
-    """A table of text.
-
-    Attributes
-    ----------
-    columns : titles; the first is that of the rows.
-    predicted : whether each column, the first included, holds predictions for the one before.
-    rows : cells, as many as columns; '' where nothing belongs, '-' where it could not be measured.
-    """
-
-    columns: tuple[str, ...]
-    predicted: tuple[bool, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
-def tabulated(findings: Sequence[Finding]) -> tuple[Tabulated, ...]:
+def tabulated(findings: Sequence[Finding]) -> list[Table]:
     """Tables of some numbers: one of those whose subjects share quantities, and one of those without a subject.
 
-    What was neither measured nor predicted for any subject is left out; a column of predictions is there only if there
-    is one.  The longer axis runs down.
+    What was neither measured nor predicted for any subject is left out.
     """
     known = [one for one in findings if np.isfinite(one.measured) or not np.isnan(one.predicted)]
-    having = [one for one in known if one.subject]
     alone = [one for one in known if not one.subject]
-    every = {one.name for one in findings}
-    return tuple(_table(part, every) for part in (*_alike(having), alone) if part)
+    cells = {(one.subject, one.title): _cell(one) for one in findings}
+    return [_table(part, cells) for part in (*_alike([one for one in known if one.subject]), alone) if part]
+
+
+def legends(tables: Sequence[Table]) -> list[str]:
+    """What the marks in some tables mean."""
+    return [
+        text for mark, text in LEGENDS.items() if any(mark in cell for rows in tables for row in rows for cell in row)
+    ]
 
 
 def _alike(findings: list[Finding]) -> list[list[Finding]]:
@@ -54,31 +50,22 @@ def _alike(findings: list[Finding]) -> list[list[Finding]]:
     return groups
 
 
-def _table(findings: list[Finding], every: Collection[str]) -> Tabulated:
-    """The table of some numbers; `every` has all names, also of what could not be measured."""
+def _table(findings: list[Finding], cells: dict[tuple[str, str], str]) -> Table:
+    """The table of some numbers; its longer axis runs down."""
     subjects = list(dict.fromkeys(one.subject for one in findings))
-    quantities = list(dict.fromkeys((one.quantity, one.unit) for one in findings))
-    cells = {(one.subject, (one.quantity, one.unit)): one for one in findings}
-    downwards = len(subjects) <= len(quantities)
-    titles = [f"{quantity} [{unit}]" if unit else quantity for quantity, unit in quantities]
-    grid = [[cells.get((subject, one)) or _unknown(subject, one, every) for one in quantities] for subject in subjects]
-    columned = grid if downwards else zip(*grid, strict=True)
-    columns = [("quantity" if downwards else "", False, titles if downwards else subjects)]
-    for head, found in zip(subjects if downwards else titles, columned, strict=True):
-        columns.append((head or "measured", False, ["" if one is None else _measured(one) for one in found]))
-        expected = ["" if one is None or np.isnan(one.predicted) else shown(one.predicted) for one in found]
-        if any(expected):
-            columns.append(("predicted", True, expected))
-    heads, predicted, rows = zip(*columns, strict=True)
-    return Tabulated(heads, predicted, tuple(zip(*rows, strict=True)))
+    titles = list(dict.fromkeys(one.title for one in findings))
+    grid = [[cells.get((subject, title), "") for title in titles] for subject in subjects]
+    if len(subjects) <= len(titles):
+        return [
+            ["quantity", *(subject or "measured" for subject in subjects)],
+            *map(list, zip(titles, *grid, strict=True)),
+        ]
+    return [["", *titles], *([subject, *row] for subject, row in zip(subjects, grid, strict=True))]
 
 
-def _unknown(subject: str, quantity: tuple[str, str], every: Collection[str]) -> Finding | None:
-    """What could not be measured of a subject; None where it does not belong."""
-    name = f"{subject}: {quantity[0]}"
-    return Finding(name, quantity[1], np.nan) if name in every else None
-
-
-def _measured(one: Finding) -> str:
-    error = f"{BESIDE}{shown(one.error)}" if np.isfinite(one.error) and np.isfinite(one.measured) else ""
-    return ">=" * one.is_lower_bound + shown(one.measured) + error + MARK * one.deviates
+def _cell(one: Finding) -> str:
+    measured = ">=" * one.is_lower_bound + shown(one.measured)
+    if np.isfinite(one.error) and np.isfinite(one.measured):
+        measured += f"{BESIDE}{shown(one.error)}"
+    predicted = "" if np.isnan(one.predicted) else f"{PREDICTED}{shown(one.predicted)}"
+    return measured + MARK * one.deviates + predicted

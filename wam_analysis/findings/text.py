@@ -4,13 +4,12 @@ import json
 import math
 import shutil
 import textwrap
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding
-from wam_analysis.findings.tabulated import LEGENDS, Tabulated, tabulated
+from wam_analysis.findings.tabulated import Table, legends, tabulated
 from wam_analysis.table import plain
 from wam_analysis.thresholds import LAYOUT
 
@@ -33,7 +32,7 @@ def text(analysis: Analysis, width: int | None = None) -> str:
         lines += ["", section.title, "─" * len(section.title)]
         for sentence in section.sentences:
             lines += _wrapped(sentence, wide)
-        lines += table_lines(section.findings, wide)
+        lines += _table_lines(section.findings, wide)
         if section.lacking:
             lines += _wrapped(f"not in this bag: {', '.join(section.lacking)}", wide)
     lines += ["", "Provenance", "──────────"]
@@ -45,45 +44,27 @@ def _wrapped(line: str, wide: int) -> list[str]:
     return textwrap.wrap(line, wide, initial_indent="  ", subsequent_indent="    ")
 
 
-def table_lines(findings: Sequence[Finding], wide: int) -> list[str]:
+def _table_lines(findings: Sequence[Finding], wide: int) -> list[str]:
     """Lines of the tables of some numbers, of so many columns; none without numbers."""
-    lines: list[str] = []
-    for table in tabulated(findings):
-        for block in _blocks(table, wide):
-            lines += ["", *(f"  {line}".rstrip() for line in block)]
-    legends = [legend for mark, legend in LEGENDS.items() if any(mark in line for line in lines)]
-    return lines + [line for legend in legends for line in _wrapped(legend, wide)]
+    tables = tabulated(findings)
+    blocks = [block for table in tables for block in _blocks(table, wide)]
+    lines = [line for block in blocks for line in ("", *(f"  {line}".rstrip() for line in block))]
+    return lines + [line for legend in legends(tables) for line in _wrapped(legend, wide)]
 
 
-def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
-    """The table in blocks that fit, each with the names of the rows; a prediction stays with what it predicts."""
-    names = max(
-        LAYOUT.column, min(int(LAYOUT.name * wide), max(map(len, (table.columns[0], *(row[0] for row in table.rows)))))
-    )
-    words = [word for name in table.columns[1:] for word in name.split()]  # none is broken
-    column = max(LAYOUT.column, *(len(text) for row in (words, *(row[1:] for row in table.rows)) for text in row))
-    column = min(column, wide - 4 - names)
+def _blocks(table: Table, wide: int) -> Iterator[list[str]]:
+    """The table in blocks that fit, each with the names of the rows."""
+    head, *rows = table
+    names = max(LAYOUT.column, min(int(LAYOUT.name * wide), max(len(row[0]) for row in table)))
+    words = [word for name in head[1:] for word in name.split()]  # none is broken
+    column = min(max(LAYOUT.column, *map(len, [*words, *(cell for row in rows for cell in row[1:])])), wide - 4 - names)
     fits = max(1, (wide - 2 - names) // (column + 2))
-    blocks: list[list[int]] = [[]]
-    for column_with_prediction in _with_predictions(table):
-        if blocks[-1] and len(blocks[-1]) + len(column_with_prediction) > fits:
-            blocks.append([])
-        blocks[-1] += column_with_prediction
-    return [_block(table, names, column, block) for block in blocks]
-
-
-def _with_predictions(table: Tabulated) -> list[list[int]]:
-    """Each measured column, with that of its predictions if there is one."""
-    starts = [j for j, is_predicted in enumerate(table.predicted) if j and not is_predicted]
-    return [list(range(*pair)) for pair in pairwise([*starts, len(table.columns)])]
-
-
-def _block(table: Tabulated, names: int, column: int, columns: list[int]) -> list[str]:
-    heads = [[table.columns[0]], *(textwrap.wrap(table.columns[j], column) for j in columns)]
-    height = max(map(len, heads))
-    head = [*zip(*([""] * (height - len(one)) + one for one in heads), strict=True)]
-    rows = [[row[0], *(row[j] for j in columns)] for row in table.rows]
-    return plain(head, rows, first=names, least=column)
+    for first in range(1, len(head), fits):
+        part = slice(first, first + fits)
+        heads = [[head[0]], *(textwrap.wrap(name, column) for name in head[part])]
+        height = max(map(len, heads))
+        above = [*zip(*([""] * (height - len(one)) + one for one in heads), strict=True)]
+        yield plain(above, [[row[0], *row[part]] for row in rows], first=names, least=column)
 
 
 def document(analysis: Analysis) -> dict[str, Any]:
