@@ -54,7 +54,9 @@ def prediction_parameters(recorded: RecordedParameters) -> PredictionParameters:
         try:
             return recorded.part(node, cls, prefix)
         except BagError as error:
-            notes[str(error).removeprefix(f"{recorded.source}: ")] = None  # the reader of a report knows the bag
+            lacks = bool(recorded.nodes) and node not in recorded.nodes
+            text = f"no parameters of the packaged {node} were recorded" if lacks else str(error)
+            notes[text.removeprefix(f"{recorded.source}: ")] = None  # the reader of a report knows the bag
             return None
 
     return PredictionParameters(

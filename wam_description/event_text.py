@@ -47,11 +47,11 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
     "slow_arm": (
         "the slow approach to this force",
-        "set guard.contact_stiffness to that of the surface, or raise limits.settling_time",
+        "raise limits.settling_time, or lower guard.contact_stiffness if all surfaces are softer",
     ),
     "shaking_arm": (
         "the vibration of the arm",
-        "use joint sensors, or set guard.contact_stiffness to that of the surface",
+        "use joint sensors, or lower guard.contact_stiffness if all surfaces are softer",
     ),
 }
 INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
@@ -94,8 +94,8 @@ SENTENCES: Final = {  # by cause
     "the contact position, use the dither, or free the arm",
     "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}): a "
     "second force acts, or the friction of the surface has changed its direction; command the force again",
-    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N (limits.contact_force or "
-    "limits.whole_force): the arm moves away, by at most limits.free_travel",
+    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N ({limit}): the arm "
+    "moves away, by at most limits.free_travel",
     "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there: "
     "command another posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
@@ -108,18 +108,18 @@ SENTENCES: Final = {  # by cause
     "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {cure}",
     "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {step}: make its "
     "steps faster, or run it in its own process",
-    "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}; then reset_fault",
+    "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is back where it was before this step; "
     "{cure}, or lower timing.period",
     "limit": "{excess}; {cure}",
     "broken": "{excess} while the brakes hold; check the cable",
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
-    "claimed": "{nodes} publish {topic}, but only one node may; stop all but one, then reset_fault",
+    "claimed": "{nodes} publish {topic}, but only one node may; stop all but one",
     "stopped": "{nodes} has stopped or is very slow: no new {topics}; start it again, or 'wam up' if that started it; "
-    "or end other programs if the computer is busy; then reset_fault",
-    "long_step": "{step}: no new {topics}; make its steps faster, then reset_fault",
-    "ended": "{node} has ended; start it again, or 'wam up' if that started it; then reset_fault",
+    "or end other programs if the computer is busy",
+    "long_step": "{step}: no new {topics}; make its steps faster",
+    "ended": "{node} has ended; start it again, or 'wam up' if that started it",
 }
 HOLDING: Final = "; the arm holds its position"
 SINCE: Final = ("without a contact", "since the force was last right or rising")

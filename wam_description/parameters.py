@@ -226,8 +226,8 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
     if missing or unknown:
         parts = [f"missing parameter '{name}'" for name in missing]
         parts += [f"unknown parameter '{name}'" for name in unknown]
-        listed_in = "docs/parameters.md" if cls.__module__.startswith("wam_") else f"the class {cls.__qualname__}"
-        raise ParameterError(f"{'; '.join(parts)}; {listed_in} lists what there is")
+        parts += ["docs/parameters.md lists what there is"] * cls.__module__.startswith("wam_")
+        raise ParameterError("; ".join(parts))
     return _assemble(cls, {name: checked(field, flat[name]) for name, field in known.items()}, "")
 
 

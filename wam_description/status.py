@@ -76,7 +76,7 @@ def diagnosed_name(namespace: str, node: str) -> str:
 def guidance(
     mode: str,
     before: str,
-    waits: Sequence[str],
+    wait: str,
     faulty: Sequence[str],
     namespace: str,
     is_played: bool,
@@ -87,14 +87,14 @@ def guidance(
     Parameters
     ----------
     mode, before : the driver's state, and that before it, '' at the start.
-    waits : what a braked driver waits for.
+    wait : what a braked driver waits for, '' for nothing.
     faulty : nodes that report a fault.
     namespace : of the arm.
     is_played : whether a scenario makes the calls.
     held : what holds an arm that is not enabled.
     """
-    if mode == "braked" and waits:
-        return f"braked; {'; '.join(waits)}"
+    if mode == "braked" and wait:
+        return f"braked; {wait}"
     if mode == "braked" and faulty:
         return f"braked; a fault is reported by {', '.join(faulty)}: enable is refused until the fault is over"
     if mode == ENABLED:

@@ -233,10 +233,10 @@ class ArmDriver(StackNode):
         mode, absent = self.health.status.mode, self.peers.absent
         is_braked = mode == Mode.BRAKED.value
         faulty, advice = (tuple(self.peers.faulty), self.advice) if is_braked else ((), "")
-        state = (mode, bool(absent), faulty, advice)
+        state = (mode, bool(absent), faulty, advice * (not absent))
         if mode and state != self._informed:
             before, self._informed = self._informed[0], state
             is_played = "scenario" in self.shared.nodes
-            waits = [f"not connected yet: {', '.join(absent)}"] * bool(absent) + [advice] * bool(advice)
-            text = guidance(mode, before, waits, faulty, self.get_namespace(), is_played, self.safety.held)
+            wait = f"not connected yet: {', '.join(absent)}" if absent else advice
+            text = guidance(mode, before, wait, faulty, self.get_namespace(), is_played, self.safety.held)
             self.get_logger().info(text)

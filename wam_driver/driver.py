@@ -51,7 +51,7 @@ class DriverParameters:
         high=1e3,
     )
     cover_speed_limit: float = parameter(
-        "speed of the start of a cover, where it meets the previous link, above which there is a fault",
+        "speed of a cover at its end nearer the base, above which there is a fault",
         "m/s",
         high=100.0,
     )

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_description.arm import Arm
+from wam_description.number_text import brief, digits_apart
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.thresholds import DRIVER
@@ -28,7 +29,8 @@ class WatchedLimit(NamedTuple):
         """That the quantity is above its limit, which is a fault; '' while it is not."""
         if self.value <= self.limit:
             return ""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}{self.where}"
+        value = brief(self.value, max(3, digits_apart(self.value, self.limit)))
+        return f"{self.quantity} {value} {self.unit} is above its limit {self.limit:g}{self.where}"
 
 
 class LimitWatch:
@@ -53,7 +55,7 @@ class LimitWatch:
         self._travels = {f"travel of {name} from the middle of its range": i for i, name in enumerate(joints.names)}
         self._of_cables = [(f"cable tension of {name}", "N") for name in motors.names]
         self._quantities = [
-            *((f"speed of the start of {cover}", "m/s") for cover in starts),
+            *((f"speed of {cover} at the end nearer the base", "m/s") for cover in starts),
             ("speed of the tip", "m/s"),
             *((f"speed of {name}", "rad/s") for name in joints.names),
             *((travel, "rad") for travel in self._travels),

@@ -8,6 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from wam_description.arm import Shared
+from wam_description.configuration import SHARED
 from wam_description.parameters import Field, ParameterError, build, fields, listed, values
 from wam_description.wiring import raised
 
@@ -35,11 +36,13 @@ def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
             f"node '{node.get_name()}' has no parameters; start it with --ros-args --params-file config/wam.yaml, "
             "or with 'wam node'"
         )
+    name, where = node.get_name(), f"section '{SHARED}'"
     try:
-        shared = build(Shared, {name: value for name, value in given.items() if name in shared_names})
-        own = build(cls, {name: value for name, value in given.items() if name not in shared_names})
+        shared = build(Shared, {key: value for key, value in given.items() if key in shared_names})
+        where = f"section '/**/{name}' (in a test: arm.start({name}={{...}}))"
+        own = build(cls, {key: value for key, value in given.items() if key not in shared_names})
     except ParameterError as error:
-        raise ParameterError(f"node '{node.get_name()}': {error}") from None
+        raise ParameterError(f"node '{name}', {where}: {error}") from None
     for part, instance in ((Shared, shared), (cls, own)):
         current = values(instance)
         for field in fields(part):

@@ -36,7 +36,6 @@ from wam_sim.simulation import Simulation
 __all__ = ["IdentifiedModel", "analyse", "arm", "guard", "identify", "load", "read", "simulate"]
 
 Named = str | Path | Configuration
-ALWAYS = "assesses the gains as they are given; a running stack lowers those that are too large (guard.mode limit)"
 
 
 def load(name: str | Path = "wam", values: Mapping[str, Any] | None = None) -> Configuration:
@@ -110,12 +109,11 @@ def guard(configuration: Named = "wam") -> Report:
     """
     found = _loaded(configuration)
     shared, own = found.shared, found.node("force_loop", ForceLoopParameters)
-    lowers = own.guard.mode == "limit"
-    if lowers:
+    mode = own.guard.mode
+    if mode == "limit":
         own = replace(own, guard=replace(own.guard, mode="refuse"))
     assessed = ForceLoop(shared.model_arm, shared.servo, own, shared.timing).report
-    never_lowers = lowers and assessed.facts["guard"] == "refuse"  # not where nothing is fed back
-    return assessed._replace(facts=assessed.facts | {"guard": ALWAYS}) if never_lowers else assessed
+    return assessed._replace(facts=assessed.facts | ({"guard.mode": mode} if "domain" in assessed.facts else {}))
 
 
 class IdentifiedModel(NamedTuple):

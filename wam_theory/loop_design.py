@@ -12,6 +12,7 @@ from wam_theory.rounding import rounded_down
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 from wam_theory.thresholds import DESIGN
 
+UNITS = "units: those of the options; errors, deadband and limit cycles (peak to peak) in N, or N m of a rotary loop"
 ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop changes the margin"
 
 
@@ -42,11 +43,12 @@ class LoopDesign(NamedTuple):
         part, ratio = self.loop.gain / verdict.margin, node.transmission_stiffness / node.contact_stiffness
         stiction = "none"
         if cycle.peak_to_peak:
-            stiction = f"{cycle.peak_to_peak:.4g} peak to peak every {cycle.period:.3g} s; a deadband of "
+            stiction = f"{cycle.peak_to_peak:.4g} every {cycle.period:.3g} s; a deadband of "
             stiction += f"{cycle.deadband:.3g} removes it"
         undecided = verdict.undecided_error
         lines = [
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
+            UNITS,
             f"margin: the gain is {part:.3g} times the largest linearly stable one, {verdict.margin:.4g}",
             f"largest safe error: {verdict.stable_error:.4g}; saturation of the loop: {self.loop.error_limit:.4g}",
             *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
@@ -59,7 +61,7 @@ class LoopDesign(NamedTuple):
                 f"some were not followed to their end ({DESIGN.patient_events} events)"
             )
         if verdict.saturated_cycle:
-            lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
+            lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g}")
         lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the margin"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)

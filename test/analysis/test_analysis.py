@@ -241,13 +241,13 @@ def pressed(touch: float, impact: float, before: float = 1.0, known: bool = True
 
 
 @pytest.mark.parametrize(
-    ("touch", "words"), [(1.3, "touched down 0.3 s into the step"), (0.95, "touched down 0.05 s before the step")]
+    ("touch", "words"), [(1.3, "touched 0.3 s after it began"), (0.95, "touched 0.05 s before it began")]
 )
 def test_the_impact_of_a_touch_down_is_no_overshoot_of_the_control(touch: float, words: str) -> None:
     section = pressed(touch, 11.0)
     found = {finding.name.partition(": ")[2]: finding for finding in section.findings}
     (said,) = [sentence for sentence in section.sentences if "commanded on" in sentence]
-    assert f"{words} (up to 11 N)" in said
+    assert f"{words}, and the force peaked at 11 N" in said
     for name in ("overshoot", "rise time 10-90 %"):
         assert math.isnan(found[name].measured)
         assert words in found[name].note

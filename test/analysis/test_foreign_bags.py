@@ -190,7 +190,7 @@ def stick_slip_of_ros1(path: Path) -> tuple[Made, dict[str, float]]:
     sent = joints("/joint_states", time, ["slide"], position=position[:, np.newaxis], velocity=speed[:, np.newaxis])
     sent += joints("/joint_reference", time, ["slide"], position=(4.0 * time)[:, np.newaxis])
     units = topic_map([], [], ["/joint_reference"], [], ["position=deg", "velocity=deg/s"])
-    return (by_rosbags(path, sent, "ros1"), units), {"slide: slips": 24.0, "slide: at rest": 80.0}
+    return (by_rosbags(path, sent, "ros1"), units), {"slide: motions": 24.0, "slide: at rest": 80.0}
 
 
 def mapped_currents(path: Path) -> tuple[Made, dict[str, float]]:
@@ -348,8 +348,8 @@ def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: f
     (stick_slip,) = (section for section in analysis.sections if section.key == "stick_slip")
     assert [one.partition(":")[0] for one in stick_slip.shows] == ["hunts"]
     assert re.search(r"\(from 0\.(79|8\d), 1\.(79|8\d), 2\.", stick_slip.shows[0])
-    assert numbers["swings: slips"] == 1.0
-    assert numbers["hunts: slips"] == pytest.approx(24.0, abs=1.0)
+    assert numbers["swings: motions"] == 1.0
+    assert numbers["hunts: motions"] == pytest.approx(24.0, abs=1.0)
 
 
 def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from wam_description.signals import NO_CONTACT, ForceCommand, State
 
 Array = NDArray[np.float64]
 PACKAGED = CONFIGURATION.node("force_loop", ForceLoopParameters)
+LIMIT = "limits.contact_force"
 OWN = replace(
     PACKAGED,
     contact_source="pinned",
@@ -146,7 +147,7 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
     def step(force: float, allowed: float = 20.0, periods: int = 1) -> list[float]:
         torques = WorldTorques(none + force * UP @ jacobian, none, None, sd)
         for _ in range(periods):
-            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, allowed, True, 0.03, OWN, DT)
+            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, (allowed, LIMIT), True, 0.03, OWN, DT)
         return [row.speed for row in rows]
 
     def direct(force: float) -> float:
@@ -159,7 +160,12 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
     assert step(200.0)[0] > 0.0
     assert pushed.event is not None
     assert pushed.event.code is Code.PUSHED
-    assert pushed.event.values == {"cause": "pushed", "force": pytest.approx(direct(200.0)), "allowed": 20.0}
+    assert pushed.event.values == {
+        "cause": "pushed",
+        "force": pytest.approx(direct(200.0)),
+        "allowed": 20.0,
+        "limit": LIMIT,
+    }
     step(0.0, periods=39)
     assert pushed.event is not None
     step(0.0, periods=3)
@@ -174,5 +180,5 @@ def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> Non
         size = 40.0 if k < 100 else max(5.0, 40.0 - 0.2 * (k - 100))
         torques = WorldTorques(-size * axis.along, none, None, np.full(4, 0.015))
         allowed = 1.5 * (40.0 if k < 100 else 5.0)
-        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, allowed, True, 0.03, OWN, DT)
+        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, (allowed, LIMIT), True, 0.03, OWN, DT)
         assert pushed.event is None

@@ -39,8 +39,14 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
         (Event(Code.DONE), "done"),
         (refused("task_command", "no effect"), "no effect"),
         (Event(Code.FAULT, Level.ERROR, {"reason": "the cable slipped"}), "the cable slipped"),
-        (warning(Code.PUSHED, "pushed", force=24.6, allowed=20.0), "with at least 25 N; allowed: 20 N"),
-        (warning(Code.PUSHED, "pushed", force=20.04, allowed=20.0), "with at least 20.04 N; allowed: 20 N"),
+        (
+            warning(Code.PUSHED, "pushed", force=24.6, allowed=20.0, limit="limits.whole_force"),
+            "with at least 25 N; allowed: 20 N",
+        ),
+        (
+            warning(Code.PUSHED, "pushed", force=20.04, allowed=20.0, limit="limits.whole_force"),
+            "with at least 20.04 N; allowed: 20 N",
+        ),
     ],
 )
 def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: str) -> None:

@@ -183,7 +183,7 @@ SPIN = (6.0, 0.0, 0.0, 0.0)
     [
         (1.0, {"speed_limit": (1.0, 1e6, 1e6, 1e6)}, NO_LIMITS, "speed of joint1"),
         (0.8, FAST_JOINTS, NO_LIMITS | {"tip_speed_limit": 0.8}, "speed of the tip"),
-        (0.4, FAST_JOINTS, NO_LIMITS | {"cover_speed_limit": 0.4}, "speed of the start of outer_link"),
+        (0.4, FAST_JOINTS, NO_LIMITS | {"cover_speed_limit": 0.4}, "speed of outer_link at the end nearer the base"),
     ],
 )
 def test_too_fast_is_a_fault_and_nearly_too_fast_a_warning(

@@ -298,7 +298,7 @@ def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(started: Any, 
     errors = [line for line in stack.said().splitlines() if line.startswith("error: ")]
     cause = f"error: {GROUP} was ended from outside by SIGKILL; the system does that if memory is short"
     assert errors[0] == f"{cause}; the other nodes are stopped now", "the cause comes first"
-    assert errors[-1] == f"{cause}; all nodes are stopped"
+    assert not any(cause in line for line in errors[1:]), "and once"
     assert stack.process.returncode == 9
     assert statuses(tmp_path, "driver")[-1] == "braked"
 

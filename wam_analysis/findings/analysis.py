@@ -210,7 +210,7 @@ def happened_section(recording: AnalysedRecording) -> Section:
     wrong += [stated(recording.failure)] if recording.failure and not faults else []
     sentences = [*wrong, *map(stated, faults[1:]), *_changed(run, recording.traces.zero)]
     if recording.parameters.note:
-        sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
+        sentences.append(f"Some numbers have no prediction: {recording.parameters.note}.")
     lacking = run.lacking("joint_states", "force_command", "contact/wrench", "status")
     return Section("happened", "What happened", sentences, (), lacking, (), wrong)
 
@@ -232,7 +232,8 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
             node, _, name = key.partition(":")
             before = run.parameters.nodes.get(node, {}).get(name)
             if before not in (None, value):
-                found.setdefault(key, f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s")
+                text = f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s"
+                found.setdefault(key, text + _lowered(run, node, name, stamp))
     if found:
         named = list(found.values())
         more = f" and {len(named) - LAYOUT.changes} more" * (len(named) > LAYOUT.changes)
@@ -240,6 +241,14 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
             f"Changed while it ran: {', '.join(named[: LAYOUT.changes])}{more}. "
             "Predictions and domains of gains are for the values at the start."
         )
+
+
+def _lowered(run: RecordedRun, node: str, name: str, since: int) -> str:
+    """To what the guard lowered a parameter that was set at a time, ns, '' where it did not."""
+    later = (
+        status.facts.get("lowered", "") for at, status in run.stamped_statuses() if at >= since and status.node == node
+    )
+    return next((f", lowered by the guard to {text}" for text in later if name in text), "")
 
 
 SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, force_section, contact_section)

@@ -143,8 +143,8 @@ def _impact(one: HeldForce) -> str:
 def _touched(one: HeldForce) -> str:
     """When a press touched down, and how hard."""
     peak = float(np.nanmax(one.true if len(one.true) else one.measured))
-    text = f"it touched down {shown(abs(one.touched), 's')} {'into' if one.touched > 0.0 else 'before'} the step"
-    return f"{text if one.touched else 'it touched down at the start of the step'} (up to {shown(peak, 'N')})"
+    when = f"{shown(abs(one.touched), 's')} {'after' if one.touched > 0.0 else 'before'} it" if one.touched else "as it"
+    return f"the surface was touched {when} began, and the force peaked at {shown(peak, 'N')}"
 
 
 def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
@@ -175,7 +175,7 @@ def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
         rose, late, over, why = response.rise, response.rise_error, 100.0 * response.overshoot, ""
         if impact := _impact(one):
             rose = late = over = math.nan
-            why = f"not measured: it {impact}"
+            why = f"not measured: {impact}"
         since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
             Finding(

@@ -31,7 +31,7 @@ def stick_section(recording: AnalysedRecording) -> Section:
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
-            Finding(f"{one.label}: slips", "", float(found.slips)),
+            Finding(f"{one.label}: motions", "", float(found.slips)),
         ]
         sentence = f"{one.label}: {found.words}"
         if recording.is_foreign and found.stuck and 0 < found.slips == len(found.begins):  # ours have the arm's time

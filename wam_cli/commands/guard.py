@@ -67,9 +67,9 @@ def _assess_configuration(configuration: Configuration) -> int:
     report = guard(configuration)
     facts = {name: value for name, value in report.facts.items() if name not in WHILE_IT_RUNS}
     width = max(map(len, facts))
+    if SERVO not in configuration.shared.nodes and "domain" in facts:
+        print(f"computed for the packaged {SERVO}; the guard does not know the one that this configuration runs")
     print("\n".join([report.message, *(f"  {name:{width}}  {value}" for name, value in facts.items())]))
-    if SERVO not in configuration.shared.nodes:
-        print(f"this is with the packaged {SERVO}, which this configuration does not run")
     return int(report.is_warning)
 
 

@@ -1,7 +1,10 @@
 """`wam up`: the nodes, until Ctrl-C."""
 
 import argparse
+import shlex
 import sys
+import time
+from pathlib import Path
 
 from wam_cli.commands.live import page_next_to
 from wam_cli.options import (
@@ -53,6 +56,11 @@ def run(given: argparse.Namespace) -> int:
     configuration = timed(configuration_of(given), given)
     extra = ["scenario"] * bool(given.scenario) + ["recorder"] * given.record
     configuration = configuration.with_nodes(*extra)
+    if given.record:
+        own = configuration.sections["recorder"]
+        name = own["name"] or f"{configuration.shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+        bag = Path(str(own["directory"])) / str(name)
+        configuration = configuration.with_values({"recorder:name": name})
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
         steps = load_for(configuration, given.scenario)  # refused before any node starts
@@ -69,24 +77,20 @@ def run(given: argparse.Namespace) -> int:
         page_next_to(given, given.namespace, lambda: stop.is_set) as close_page,
         start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
+        each = stack.processes if isinstance(stack, Processes) else ()
         if not stop.is_set:
-            each = stack.processes if isinstance(stack, Processes) else ()
             where = f"{len(each)} processes ({'; '.join(each)})" if each else "this process"
             print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
-        failures = stack.failures
-        for failure in failures:  # before the others end and print what follows from it
+        for failure in stack.failures if each else []:  # a node of this process has printed it
             print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
         close_page()
     for node, code in ended.items():
-        if not code:
-            who = "the scenario" if "scenario" in node.split(", ") else process_of(node)
-            print(f"{who} has ended, so all nodes were stopped")
+        who = "the scenario" if "scenario" in node.split(", ") else process_of(node)
+        print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
     if given.scenario and "scenario" in ", ".join(ended).split(", ") and not any(ended.values()):
-        record = "" if given.record else "play it with --record, then "
-        print(f"played; to see whether its commands were carried out: {record}'wam analyse BAG --steps'")
-    for failure in failures:
-        print(f"error: {failure}; all nodes are stopped", file=sys.stderr)
+        seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
+        print(f"to see whether its commands were carried out: {seen}")
     if stack.bag_failure:
         print(f"error: {stack.bag_failure}", file=sys.stderr)
     return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed or stack.bag_failure))

@@ -479,17 +479,18 @@ class ForceLoop:
         # whatever is touched is loaded by the arm's own motion, also where that is not along the commanded force
         has_touched = contact.cover or any(one.watch.touch.has_been for one in run.axes)
         pressed = math.fsum(axis.desired for axis in forces) if has_touched else 0.0
-        if not holds:
-            allowed = own.limits.contact_force
-            if pressed and len(forces) == len(run.axes):
-                allowed = min(allowed, own.limits.whole_force * pressed)
+        bounds = [(own.limits.contact_force, "limits.contact_force")]
+        if holds:
+            bounds.append((allowed, "that of the command"))
+        elif pressed and len(forces) == len(run.axes):
+            bounds.append((own.limits.whole_force * pressed, "limits.whole_force"))
         now = torques.now - run.resting
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._q).dot(torques.acceleration)
         chi2 = max((one.known.chi2 for one in run.axes), default=0.0)
         gain = self._supervision.present * max(own.force_gain)
         torques = WorldTorques(now, torques.before, torques.acceleration, torques.sd)
-        return self._pushed.step(self._q, forces, torques, contact, chi2, allowed, bool(pressed), gain, own, dt)
+        return self._pushed.step(self._q, forces, torques, contact, chi2, min(bounds), bool(pressed), gain, own, dt)
 
     def _guarded(self, axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
         """What is controlled now, for the guard."""

@@ -232,7 +232,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
         message += f", gains scaled by {watch.factor:.3g}: the contact is stiffer here than where they were tuned"
     cycle = assessment.cycle
     facts = {
-        "guard": mode,
+        "guard.mode": mode,
         "domain": str(assessment.domain),
         "margin": _margin(assessment.scale),
         "margin here": _margin(here, watch.needed if watch.assessed else GUARD.largest_scale),

@@ -50,7 +50,7 @@ class PushedArm:
         torques: WorldTorques,
         contact: Contact,
         chi2: float,
-        allowed: float,
+        bound: tuple[float, str],
         is_pressing: bool,
         gain: float,
         own: ForceLoopParameters,
@@ -65,7 +65,7 @@ class PushedArm:
         torques : of the world on the joints, of the arm's own motion free.
         contact : estimated.
         chi2 : of the torques that the commanded forces do not explain.
-        allowed : force, N, up to which nothing gives way.
+        bound : force, N, up to which nothing gives way, and what sets it.
         is_pressing : whether the commanded force presses on something.
         gain : of the force law, m/s/N.
         own : parameters of the force loop.
@@ -81,11 +81,12 @@ class PushedArm:
         hardest = max((push.least for push in pushes), default=0.0)
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
+        allowed, limit = bound
         allowed = max(allowed, self._allowed * (1.0 - fade))
         self._allowed = allowed if is_pressing else 0.0
         if hardest > allowed:
             self._since = 0.0
-            values: dict[str, Value] = {"force": hardest, "allowed": allowed}
+            values: dict[str, Value] = {"force": hardest, "allowed": allowed, "limit": limit}
             self.event = warning(Code.PUSHED, "pushed", **values)
         elif self._since > FORCE.lasting:
             self.event = None

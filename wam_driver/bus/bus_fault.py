@@ -38,7 +38,7 @@ class BusFault(Enum):
     ESTOP = "E-stop; release it and press Shift-Idle{detail}"
     SAFETY_IDLE = "the safety module went to idle{detail}; press Shift-Activate when the arm may move"
     SAFETY_SILENT = "the safety module does not answer; check the cable to the pendant"
-    CONTROLLER_IDLE = "motor controller {node} left the torque mode: {detail}; call reset_fault, then enable"
+    CONTROLLER_IDLE = "motor controller {node} left the torque mode: {detail}"
     FOREIGN = "another computer sends on this bus; end its program"
     DOUBLED = "two nodes have the number {node}; give each its own"
     NOT_SENT = "the adapter refused {detail} frames; check adapter, cable and power of the arm"
