@@ -19,22 +19,23 @@ from wam_bag.mcap_file import BagFile, McapFile
 from wam_bag.mcap_records import MAGIC
 from wam_bag.message_search import NEVER, Found
 from wam_bag.message_text import definitions, full_name
-from wam_bag.rosbags_file import RosbagsFile, needs_rosbags
+from wam_bag.rosbags_file import SUFFIXES, RosbagsFile
 
-COMPRESSED = ".mcap.zstd"
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
+_EACH_MESSAGE = re.compile(r"^  compression_mode: *['\"]?message", re.MULTILINE | re.IGNORECASE)
 
 
 def files(path: Path) -> list[Path]:
-    """The MCAP files of a bag directory in the order of recording, or the one file."""
-    if path.name.endswith(COMPRESSED):
-        raise _compressed(path)
-    if path.is_file() or needs_rosbags(path):
+    """The files of a bag directory in the order of recording, or the one file; a directory is for rosbags."""
+    if path.is_file():
         return [path]
     if not path.exists():
         raise BagError(f"{path} does not exist; give a bag directory or an .mcap file")
-    found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
-    named, there = _listed_files(path), [file.name for file in found]
+    text, databases = _description(path), sorted(path.glob("*.db3"))
+    if any(path.glob("*.zstd")) or _EACH_MESSAGE.search(text) or (databases and text):
+        return [path]
+    found = sorted([*path.glob("*.mcap"), *databases], key=lambda file: (len(file.name), file.name))
+    named, there = _listed_files(path, text), [file.name for file in found]
     for name in named:
         if name not in there:
             raise BagError(
@@ -46,47 +47,36 @@ def files(path: Path) -> list[Path]:
             f"{command('wam bag repair', path)} writes it again, or give the file by itself"
         )
     if not found:
-        refuse_compressed(path)
         raise BagError(f"{path} has no .mcap file and no .db3 file; give the directory of a bag")
     return found
 
 
-def _listed_files(path: Path) -> list[str]:
-    """Files that metadata.yaml lists, none if it is missing."""
+def _description(path: Path) -> str:
+    """Text of metadata.yaml, '' if it is missing."""
     file = path / "metadata.yaml"
-    if not file.is_file():
-        return []
     try:
         if (size := file.stat().st_size) > READING_LIMITS.metadata:
             raise ValueError(f"it has {size} bytes; at most {READING_LIMITS.metadata} are read")
-        text = file.read_text(encoding="utf-8")
+        return file.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return ""
+    except ValueError as error:
+        raise _damaged(path, error) from None
+
+
+def _listed_files(path: Path, text: str) -> list[str]:
+    """Files that metadata.yaml lists."""
+    try:
         part = _FILE_NAMES.search(text)  # the only lines that are needed of a long file
-        listed = [str(name) for name in safe_yaml.load(part[0] if part else text)["relative_file_paths"]]
+        return [str(name) for name in safe_yaml.load(part[0] if part else text)["relative_file_paths"]] if text else []
     except (yaml.YAMLError, ValueError, KeyError, TypeError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise BagError(f"{file} is damaged ({reason}); {command('wam bag repair', path)} writes it again") from None
-    if any(name.endswith(COMPRESSED) for name in listed):
-        raise _compressed(path)
-    return listed
+        raise _damaged(path, error) from None
 
 
-def refuse_compressed(path: Path) -> None:
-    """Refuse a directory whose files were compressed as a whole.
-
-    Raises
-    ------
-    BagError
-        states what to do.
-    """
-    if any(path.glob(f"*{COMPRESSED}")):
-        raise _compressed(path)
-
-
-def _compressed(path: Path) -> BagError:
-    file, bag = (path, path.parent) if path.is_file() else (path / f"*{COMPRESSED}", path)
+def _damaged(path: Path, error: Exception) -> BagError:
+    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
     return BagError(
-        f"{path} was compressed as a whole by rosbag2 (compression mode 'file') and is not read; decompress it with "
-        f"'zstd -d --rm {file}', then {command('wam bag repair', bag)} writes its metadata.yaml again"
+        f"{path / 'metadata.yaml'} is damaged ({reason}); {command('wam bag repair', path)} writes it again"
     )
 
 
@@ -94,7 +84,7 @@ def _compressed(path: Path) -> BagError:
 def opened(path: Path) -> Iterator[BagFile]:
     """An open file of a bag; errors of it in the context become a BagError."""
     try:
-        with RosbagsFile(path) if needs_rosbags(path) else McapFile(path) as file:
+        with RosbagsFile(path) if path.is_dir() or path.suffix in SUFFIXES else McapFile(path) as file:
             file.open()
             yield file
     except BagError:
@@ -111,7 +101,7 @@ def _explain(path: Path, error: Exception) -> str:
     if not start:
         return f"{path} is empty, nothing was recorded; record again"
     if start != MAGIC:
-        return f"{path} is not MCAP; give a bag recorded with storage 'mcap'"
+        return f"{path} is not MCAP; give a bag recorded with storage 'mcap', or the directory of a compressed one"
     if isinstance(error, NotClosedError):
         return (
             f"{path} was not closed, the recorder was killed or the copy is incomplete; "

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 from mcap.opcode import Opcode
 from mcap.records import Message
 
-from wam_bag.bag_file import files, refuse_compressed
+from wam_bag.bag_file import files
 from wam_bag.bag_writer import CHUNK_SIZE, release
 from wam_bag.errors import BROKEN, BagError, Damage, TooLargeError
 from wam_bag.losses import REPAIRED, FileLosses, Hole
@@ -56,7 +56,6 @@ def repair(path: Path) -> list[Repaired]:
         return [_repair_file(path)]
     found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
     if not found:
-        refuse_compressed(path)
         raise BagError(f"{path} has no .mcap file; give a bag directory or an .mcap file")
     release(path)
     done = []

@@ -1,8 +1,7 @@
-"""Bags of ROS 1 and of SQLite, opened for reading by rosbags: without checksums, their messages as those of MCAP."""
+"""Bags of ROS 1, of SQLite and those compressed by rosbag2, opened for reading by rosbags: without checksums."""
 
 import importlib
 from collections.abc import Iterator
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
@@ -14,11 +13,6 @@ from wam_bag.mcap_file import BATCH, BagFile, MessageCounts
 from wam_bag.message_search import NEVER, MessageBatch, packed
 
 SUFFIXES: Final = (".bag", ".db3")
-
-
-def needs_rosbags(path: Path) -> bool:
-    """Whether a bag is of ROS 1 or of SQLite, which rosbags reads."""
-    return path.suffix in SUFFIXES if path.is_file() else any(path.glob("*.db3*"))
 
 
 class RosbagsFile(BagFile):
@@ -37,7 +31,7 @@ class RosbagsFile(BagFile):
             rosbags: Any = importlib.import_module("rosbags.highlevel.anyreader")
         except ImportError:
             raise BagError(
-                f"{self.path} is not an MCAP file; rosbags reads it: pip install 'wam_stack[rosbags]'"
+                f"{self.path} is not plain MCAP; rosbags reads it: pip install 'wam_stack[rosbags]'"
             ) from None
         store = rosbags.get_typestore(importlib.import_module("rosbags.typesys").Stores.ROS2_HUMBLE)
         # where the bag defines no types

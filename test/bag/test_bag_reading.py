@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-import zstandard
 from bag_mutations import MEMORY, break_bags, limits
 from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
 
-from wam_analysis.findings.analysis import analyse
 from wam_bag import mcap_file, safe_yaml
 from wam_bag.bag import (
     Bag,
@@ -451,29 +451,22 @@ def test_a_broken_metadata_file_is_refused_or_read_never_a_crash(tmp_path: Path)
     assert refused > 50
 
 
-def test_files_that_were_compressed_as_a_whole_are_refused_and_read_once_they_are_decompressed(tmp_path: Path) -> None:
-    split_bag(bag := tmp_path / "bag")
-    whole = len(read(bag).topics["/js"].log_time_ns)
-    files = sorted(bag.glob("*.mcap"))
-    for file in files:
-        file.with_name(f"{file.name}.zstd").write_bytes(zstandard.compress(file.read_bytes()))
-        file.unlink()
-    described = bag / "metadata.yaml"
-    described.write_text(described.read_text().replace(".mcap", ".mcap.zstd"))
-    commands = rf"decompress it with 'zstd -d --rm {bag}/\*.mcap.zstd', then 'wam bag repair {bag}'"
-    for use in (read, lambda path: read(path, ()), lambda path: analyse(path, lambda doing: None)):
-        with pytest.raises(BagError, match=commands):
-            use(bag)
-    with pytest.raises(BagError, match=r"compressed as a whole"):
-        read(bag / f"{files[0].name}.zstd")
-    with pytest.raises(BagError, match=commands):
-        repair(bag)
-    for file in files:
-        compressed = file.with_name(f"{file.name}.zstd")
-        file.write_bytes(zstandard.decompress(compressed.read_bytes()))
-        compressed.unlink()
-    repair(bag)
-    assert len(read(bag).topics["/js"].log_time_ns) == whole
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
+def test_what_rosbag2_compressed_is_read_by_rosbags(
+    mode: CompressionMode, storage: StoragePlugin, tmp_path: Path
+) -> None:
+    kind, bag = "std_msgs/msg/Float64", tmp_path / "bag"
+    writer = Ros2Writer(bag, version=9, storage_plugin=storage)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        topic = writer.add_connection("/x", kind, typestore=STORE)
+        for k in range(50):
+            writer.write(topic, k, STORE.serialize_cdr(STORE.types[kind](float(k)), kind))
+    assert read(bag).topics["/x"].column("data").tolist() == list(range(50))
+    for file in bag.glob("*.zstd"):
+        with pytest.raises(BagError, match="or the directory of a compressed one"):
+            read(file)
 
 
 def _with(sample: Sample, change: Callable[[bytearray], None]) -> Sample:

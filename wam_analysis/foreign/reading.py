@@ -1,5 +1,6 @@
 """Bags of other robots as columns of joints and wrenches."""
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -13,12 +14,18 @@ from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
 from wam_bag.columns import UNNAMED, joint_columns
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
+INTERFACES = "control_msgs/msg/DynamicJointState"
 FIELDS = {  # of the types that are known, by quantity
     JOINTS: {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"},
     WRENCH: {"force": "wrench.force", "torque": "wrench.torque"},
+    INTERFACES: {"name": "joint_names", **{q: f"interface_values.{q}" for q in IN_JOINTS}},
 }
-CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
-CONTROLLER_PARTS = {"": ("feedback", "actual"), " command": ("reference", "desired")}  # suffix of the topic: names
+POINTS = {
+    "": ("feedback", "actual"),
+    " command": ("reference", "desired"),
+}  # of a controller: suffix of the topic, names
+OF_POINT = {"position": "positions", "velocity": "velocities", "effort": "effort"}
 COMMAND = "command"
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
 TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
@@ -38,7 +45,12 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
     ValueError
         if a topic, joint or field of the map is not there.
     """
-    chosen = [name for name, kind in source.types.items() if _is_wanted(name, kind, given)]
+    kinds = {source.types[name] for name, number in source.counts.items() if number}
+    read_as_it_is = {JOINTS, WRENCH, CONTROLLER, *([] if JOINTS in kinds else [INTERFACES])}  # which has the same again
+    named = (*given.topics, *given.commands)
+    chosen = [
+        name for name, kind in source.types.items() if name in named or (kind in read_as_it_is and not given.topics)
+    ]
     is_mapped = bool(given.fields) or "stamp" in given.units
     return _analysed(read(source.path, chosen, as_messages=is_mapped), given)
 
@@ -49,6 +61,10 @@ def _analysed(bag: Bag, given: TopicMap) -> Bag:
     if missing:
         listed = ", ".join(sorted(bag.counts)) or "none"
         raise ValueError(f"{bag.path} has no topic {missing[0]}; its topics: {listed}")
+    first = {name: one.messages[0] for name, one in bag.topics.items() if isinstance(one, Messages) and one.messages}
+    for path in (path for paths in given.fields.values() for path in paths.split(",")):
+        if first and not any(_has(message, path) for message in first.values()):
+            _at(*next(iter(first.items())), path)  # raises what the messages have
     topics: dict[str, Any] = {}
     types = dict(bag.types)
     for name, columns in bag.topics.items():
@@ -67,12 +83,6 @@ def checked(bag: Bag, given: TopicMap) -> Bag:
     return bag
 
 
-def _is_wanted(topic: str, kind: str, given: TopicMap) -> bool:
-    if given.topics:
-        return topic in (*given.topics, *given.commands)
-    return kind in (JOINTS, WRENCH, CONTROLLER) or topic in given.commands
-
-
 # to columns
 
 
@@ -87,22 +97,44 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
     elif isinstance(columns, WrenchColumns):
         force, torque = (given.scaled(q)[0] for q in ("force", "torque"))
         yield topic, columns._replace(force=force * columns.force, torque=torque * columns.torque)
-    elif len(columns.log_time_ns) and kind == CONTROLLER and not given.fields:
-        for suffix, names in CONTROLLER_PARTS.items():
-            part = next((name for name in names if hasattr(columns.messages[0], name)), names[0])
-            parts = {"name": "joint_names", "position": f"{part}.positions", "velocity": f"{part}.velocities"}
-            yield topic + suffix, _joints(topic, columns, parts, given)
-    elif len(columns.log_time_ns):
-        own = FIELDS.get(kind, {})
-        every = own | dict(given.fields)
-        known = {q: path for q, path in every.items() if not own or q in own or q == "stamp"}
-        if not known:
-            raise ValueError(f"{topic} is of type {kind}; name its fields, for example --map position=FIELD")
-        has_joints, has_wrench = any(q in known for q in IN_JOINTS), "force" in known or "torque" in known
-        if has_joints:
-            yield topic, _joints(topic, columns, known, given)
-        if has_wrench:
-            yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, known, given)
+    elif columns.messages:
+        for suffix, fields in _fields(kind, columns, given).items():
+            has_joints, has_wrench = any(q in fields for q in IN_JOINTS), "force" in fields or "torque" in fields
+            if not has_joints and not has_wrench:
+                raise ValueError(f"{topic} is of type {kind}; name its fields, for example --map position=FIELD")
+            if has_joints:
+                yield topic + suffix, _joints(topic, columns, fields, given)
+            if has_wrench:
+                yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, fields, given)
+
+
+def _fields(kind: str, columns: Messages, given: TopicMap) -> dict[str, dict[str, str]]:
+    """Where messages have which quantity, by suffix of the topic: what is given, else what is known of their type."""
+    mapped = {q: path for q, path in given.fields.items() if all(_has(columns.messages[0], p) for p in path.split(","))}
+    if kind == CONTROLLER and not mapped:
+        found = {}
+        for suffix, names in POINTS.items():
+            part = max(names, key=lambda name: _filled(columns, f"{name}.positions"))
+            found[suffix] = {"name": "joint_names", **{q: f"{part}.{own}" for q, own in OF_POINT.items()}}
+        return found
+    own = FIELDS.get(kind)
+    if own is None:
+        return {"": dict(given.fields)}
+    return {"": own | {q: path for q, path in mapped.items() if q in own or q == "stamp"}}
+
+
+def _filled(columns: Messages, path: str) -> int:
+    """How many messages have values at a path; -1 if their type does not have it."""
+    return sum(len(_at("", one, path)) > 0 for one in columns.messages) if _has(columns.messages[0], path) else -1
+
+
+def _has(message: Any, path: str) -> bool:
+    """Whether a message has a field."""
+    try:
+        _at("", message, path)
+    except ValueError:
+        return False
+    return True
 
 
 def _at(topic: str, message: Any, path: str) -> Any:
@@ -110,11 +142,18 @@ def _at(topic: str, message: Any, path: str) -> Any:
     value = message
     for part in path.split("."):
         try:
-            value = [getattr(one, part) for one in value] if isinstance(value, list) else getattr(value, part)
+            value = [_part(one, part) for one in value] if isinstance(value, list) else getattr(value, part)
         except AttributeError:
             fields = ", ".join(getattr(message, "_fields", ()) or vars(message))
             raise ValueError(f"{topic} has no field '{path}'; its messages have {fields}") from None
     return value
+
+
+def _part(element: Any, name: str) -> Any:
+    """A field of an element of a list; of one that names its interfaces the value of this interface, NaN for none."""
+    if not hasattr(element, "interface_names") or hasattr(element, name):
+        return getattr(element, name)
+    return dict(zip(element.interface_names, element.values, strict=False)).get(name, math.nan)
 
 
 def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> Times:
@@ -127,10 +166,10 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
         return BILLION * seconds.astype(np.int64) + parts.astype(np.int64)
     stamps = [_at(topic, message, path) for message in columns.messages]
     for whole, rest in PARTS_OF_TIME:
-        if hasattr(stamps[0], whole):
+        if hasattr(stamps[0], whole) and hasattr(stamps[0], rest):
             if "stamp" in given.units:
                 raise ValueError(TIME_OF_ROS.format(topic))
-            return np.array([getattr(one, whole) * BILLION + getattr(one, rest, 0) for one in stamps], np.int64)
+            return np.array([getattr(one, whole) * BILLION + getattr(one, rest) for one in stamps], np.int64)
     numbers = np.array(stamps)
     try:
         numbers = numbers if numbers.dtype.kind in "iu" else numbers.astype(np.float64)
