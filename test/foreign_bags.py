@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mcap.writer import Writer as McapWriter
 from mcap_ros2.writer import Writer as McapRos2Writer
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
@@ -15,8 +16,16 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 ORIGIN = 1_700_000_000_000_000_000  # ns
 JOINTS, WRENCH, MOTORS = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped", "robot_msgs/msg/Motors"
-OWN = get_types_from_msg("std_msgs/Header header\nfloat64[] q\nfloat64[] dq\nfloat64[] current\n", MOTORS)
 HEADER = "std_msgs/Header header\n"
+CONTROLLER, INTERFACES = "control_msgs/msg/JointTrajectoryControllerState", "control_msgs/msg/DynamicJointState"
+PARTS = ("reference", "feedback", "desired", "actual")  # of new and old controllers
+OWN = {  # types that rosbags does not have
+    MOTORS: f"{HEADER}float64[] q\nfloat64[] dq\nfloat64[] current\n",
+    CONTROLLER: f"{HEADER}string[] joint_names\n"
+    + "".join(f"trajectory_msgs/JointTrajectoryPoint {part}\n" for part in PARTS),
+    "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values\n",
+    INTERFACES: f"{HEADER}string[] joint_names\nInterfaceValue[] interface_values\n",
+}
 LINE = "=" * 80
 TIME = f"{LINE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 STAMP = f"{LINE}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n{TIME}"
@@ -100,7 +109,8 @@ def by_rosbags(path: Path, sent: list[Sent], storage: str = "mcap") -> Path:
     """A rosbag2 directory, or a bag of ROS 1, by rosbags."""
     is_ros1 = storage == "ros1"
     store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
-    store.register(OWN)
+    for kind, text in OWN.items():
+        store.register(get_types_from_msg(text, kind))
     file = path.with_suffix(".bag") if is_ros1 else path
     plugin = StoragePlugin.SQLITE3 if storage == "sqlite3" else StoragePlugin.MCAP
     with Ros1Writer(file) if is_ros1 else Ros2Writer(file, version=9, storage_plugin=plugin) as writer:
@@ -108,27 +118,36 @@ def by_rosbags(path: Path, sent: list[Sent], storage: str = "mcap") -> Path:
         for one in in_order(sent):
             if one.topic not in connections:
                 connections[one.topic] = writer.add_connection(one.topic, one.kind, typestore=store)
-            message = made(store, one, is_ros1)
+            message = made(store, one)
             take = store.serialize_ros1 if is_ros1 else store.serialize_cdr
             writer.write(connections[one.topic], ns(one.received), take(message, one.kind))
     return file
 
 
-def made(store: Any, one: Sent, is_ros1: bool) -> Any:
-    types = store.types
-    stamp = types["builtin_interfaces/msg/Time"](ns(one.stamp) // 10**9, ns(one.stamp) % 10**9)
-    header = types["std_msgs/msg/Header"](*([0] if is_ros1 else []), stamp, one.frame)
-    if one.kind == WRENCH:
-        vector = types["geometry_msgs/msg/Vector3"]
-        wrench = types["geometry_msgs/msg/Wrench"](vector(*map(float, one.fields["force"])), vector(0.0, 0.0, 0.0))
-        return types[WRENCH](header, wrench)
-    kind, fields = types[one.kind], dict(one.fields)
-    if one.kind == JOINTS:
-        empty = np.empty(0)
-        return kind(
-            header, fields["name"], *(np.array(fields.get(q, empty)) for q in ("position", "velocity", "effort"))
-        )
-    return kind(header, *(np.array(fields[q]) for q in ("q", "dq", "current")))
+def made(store: Any, one: Sent) -> Any:
+    stamp = {"sec": ns(one.stamp) // 10**9, "nanosec": ns(one.stamp) % 10**9}
+    header = {"header": {"stamp": stamp, "frame_id": one.frame}}
+    fields = (
+        {"wrench": {"force": dict(zip("xyz", one.fields["force"], strict=True))}} if one.kind == WRENCH else one.fields
+    )
+    return built(store, one.kind, header | fields)
+
+
+def built(store: Any, kind: str, fields: dict[str, Any]) -> Any:
+    """A message of a type; what is not given is zero or empty."""
+    values = []
+    for name, (node, detail) in store.fielddefs[kind][1]:
+        if node == Nodetype.BASE:
+            values.append(fields.get(name, "" if detail[0] == "string" else 0))
+        elif node == Nodetype.NAME:
+            values.append(built(store, detail, fields.get(name, {})))
+        else:
+            (inner, type_of), _ = detail
+            given = fields.get(name, ())
+            is_list = inner == Nodetype.NAME or type_of[0] == "string"
+            parts = [built(store, type_of, part) if inner == Nodetype.NAME else part for part in given]
+            values.append(parts if is_list else np.array(given, type_of[0]))
+    return store.types[kind](*values)
 
 
 def in_order(sent: list[Sent]) -> list[Sent]:

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from mcap.records import Channel
 
 from wam_bag.bag_file import files, is_selected, opened, parts, type_of
+from wam_bag.cdr import ENCODINGS
 from wam_bag.columns import (
     BoolColumns,
     Collector,
@@ -42,6 +43,8 @@ __all__ = [
     "Bag", "BagError", "BoolColumns", "Columns", "JointColumns", "Messages", "PointColumns",
     "TableColumns", "WrenchColumns", "read",
 ]  # fmt: skip
+
+NOT_READ = ", which is not read"  # ends the type of a topic in another encoding
 
 
 class _Topics(dict[str, Columns]):
@@ -172,7 +175,9 @@ def read(
             for number, channel in file.channels.items():
                 counts[channel.topic] += listed.by_channel.get(number, 0)
                 schema = file.schemas.get(channel.schema_id)
-                types.setdefault(channel.topic, full_name(schema.name) if schema else "?")
+                is_read = channel.message_encoding in ENCODINGS
+                unread = "" if is_read else f" in {channel.message_encoding or 'no encoding'}{NOT_READ}"
+                types.setdefault(channel.topic, f"{full_name(schema.name) if schema else '?'}{unread}")
                 if is_selected(channel.topic, topics):
                     take(channel)
             for item in file.attachments():

@@ -12,7 +12,7 @@ from mcap.records import Channel
 
 from wam_bag import safe_yaml
 from wam_bag.arrays import Bytes
-from wam_bag.cdr import JSON, SCHEMAS, MessageType
+from wam_bag.cdr import ENCODINGS, JSON, SCHEMAS, MessageType
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError, command
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_file import BagFile, McapFile
@@ -178,7 +178,7 @@ def type_of(file: BagFile, channel: Channel) -> MessageType:
     if encoding == JSON:
         return MessageType(full_name(schema.name) if schema else "", JSON)
     if encoding not in SCHEMAS:
-        read = ", ".join(f"'{one}'" for one in (*SCHEMAS, JSON))
+        read = ", ".join(f"'{one}'" for one in ENCODINGS)
         raise BagError(f"{file.path} has topic {channel.topic} in encoding '{encoding}'; {read} are read; {instead}")
     if schema is None or schema.encoding != SCHEMAS[encoding]:
         what = f"a schema in '{schema.encoding}'" if schema else "no schema"

@@ -30,6 +30,7 @@ _AFTER_STAMP: Final = ENCAPSULATION + 8
 
 CDR, ROS1, JSON = "cdr", "ros1", "json"  # encodings of messages
 SCHEMAS: Final = {CDR: "ros2msg", ROS1: "ros1msg"}  # encoding of the definitions by that of the messages
+ENCODINGS: Final = (*SCHEMAS, JSON)  # that are read
 Definitions = Mapping[str, Fields]
 
 

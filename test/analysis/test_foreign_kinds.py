@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from foreign_bags import Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
+from foreign_bags import CONTROLLER, INTERFACES, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
@@ -125,6 +125,7 @@ def coarse() -> list[Case]:
         ("two of three", ros1, 150.0, lambda t: math.floor(50.0 * t) / 50.0),
         ("never set", by_mcap_ros2, 50.0, lambda t: -1.7e9),
         ("milliseconds", by_mcap_ros2, 400.0, lambda t: round(t, 3)),
+        ("set forward", sqlite, 100.0, lambda t: t + 0.4 * (t > 11.0)),
     ]
     return [
         Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
@@ -137,9 +138,29 @@ def twice() -> list[Case]:
     sent = one("/joint_states", 100.0, 0.7, 0.5)
     again = [s._replace(received=s.received + 0.0004) for s in sent]
     expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0}
+    # at 0.4 of the computer's time; it stops for 12 s, and its last message is repeated
+    slow = [s._replace(stamp=s.stamp - 1.7e9, received=s.stamp / 0.4 + 12.0 * (s.stamp > 13.0)) for s in sent]
+    slow += [slow[1300]._replace(received=slow[1300].received + 0.025 * k) for k in range(1, 480)]
     return [
+        Case("a simulation that stopped", ros1, slow, expected, "the first message of each is used"),
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
         Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
+    ]
+
+
+def by_chance() -> list[Case]:
+    """Delays that change the order of messages, and values that are no numbers, which are no lost messages."""
+    drawn, sent = np.random.default_rng(5), one("/joint_states", 100.0, 0.7, 0.5)
+    late = [s._replace(received=s.received + by) for s, by in zip(sent, 0.03 * drawn.random(len(sent)), strict=True)]
+    none = {"position": [math.nan, 0.2], "velocity": [math.nan, 0.0], "effort": [math.nan, 0.0], "name": ["a", "b"]}
+    both = [{q: [*v, *none[q][1:]] for q, v in s.fields.items()} for s in sent]
+    lacking = drawn.random(len(sent)) < 0.1
+    some = [s._replace(fields=none if lacks else fields)
+            for s, fields, lacks in zip(sent, both, lacking, strict=True)]  # fmt: skip
+    expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0, "/joint_states: missed periods": 0.0}
+    return [
+        Case("late", by_rosbags, late, expected),
+        Case("no numbers", sqlite, some, expected, f"in only {len(sent) - np.count_nonzero(lacking)} of {len(sent)}"),
     ]
 
 
@@ -168,6 +189,33 @@ def names() -> list[Case]:
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
     ]  # fmt: skip
+
+
+def of_ros2_control() -> list[Case]:
+    """States of old and new controllers, and of interfaces, those of one joint without effort."""
+    states = one("/state", 100.0, 0.7, 0.5)
+
+    def controller(commanded: str, measured: str) -> list[Sent]:
+        points = [{"positions": s.fields["position"], "velocities": s.fields["velocity"], "effort": s.fields["effort"]}
+                  for s in states]  # fmt: skip
+        parts = [{measured: point, commanded: {"positions": point["positions"]}} for point in points]
+        return [s._replace(kind=CONTROLLER, fields={"joint_names": ["a"], **part})
+                for s, part in zip(states, parts, strict=True)]  # fmt: skip
+
+    interfaces = [
+        s._replace(kind=INTERFACES, fields={"joint_names": ["b", "a"], "interface_values": [
+            {"interface_names": ["position"], "values": [0.1]},
+            {"interface_names": ["effort", "position"], "values": [*s.fields["effort"], *s.fields["position"]]},
+        ]}) for s in states
+    ]  # fmt: skip
+    expected, followed = sine(0.7, 0.5) | FRICTION, ("as it was commanded.",)
+    beside = interfaces + one("/joint_states", 50.0, 0.7, 0.5)
+    return [
+        Case("new controller", by_rosbags, controller("reference", "feedback"), expected, "", NOTHING, followed),
+        Case("old controller", sqlite, controller("desired", "actual"), expected, "", NOTHING, followed),
+        Case("interfaces", by_rosbags, interfaces, expected, "", NOTHING, ("b: never moved.",)),
+        Case("beside joint states", by_rosbags, beside, expected | {"/joint_states: period": 20.0}),
+    ]
 
 
 def called_as_commands() -> list[Case]:
@@ -341,7 +389,7 @@ def other_units() -> list[Case]:
 
 KINDS = (
     unfilled, held_over, wrong_efforts, other_units, wraps, sparse, coarse, twice, names, called_as_commands,
-    few_cycles, still, brief_rests, zeros, contradictions, formats,
+    few_cycles, still, brief_rests, zeros, contradictions, formats, of_ros2_control, by_chance,
 )  # fmt: skip
 CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
 
@@ -398,6 +446,10 @@ def date(time: float) -> str:
     return str(np.datetime64("2024-05-01T12:00:00") + np.timedelta64(round(1e9 * time), "ns"))
 
 
+def german(time: float) -> str:
+    return f"{time:,.4f}".translate(str.maketrans(",.", ".,"))
+
+
 WITH_UNITS = ("time [ms]", "position.a (deg)", "velocity.a [deg/s]", "effort.a [mA]")
 OTHER_UNITS = (1e-3, math.pi / 180.0, math.pi / 180.0, 1e-3)
 TABLES = {
@@ -408,6 +460,11 @@ TABLES = {
     "units, renamed": Written(("t [ms]", *WITH_UNITS[1:]), OTHER_UNITS, fields=("stamp=t [ms]",)),
     "decimal commas": Written(delimiter=";", decimal=","),
     "decimal commas in quotes": Written(decimal=","),
+    "separators of thousands": Written(("Time [ms]", *WITH_UNITS[1:]), OTHER_UNITS, ";", times=german),
+    "the delimiter above": Written(delimiter=";", decimal=",", comment="sep=;\n"),
+    "two columns of time": Written(
+        ("s", "position.a", "velocity.a", "effort.a", "ns"), fields=("stamp=s,ns",), times=lambda time: int(time) + 50
+    ),
     "tabs": Written(delimiter="\t"),
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "dates": Written(times=date),
@@ -423,6 +480,8 @@ def table_of(how: Written) -> tuple[list[str], list[list[Any]]]:
     time, *others = motion(100.0, 0.7, 0.5)
     columns = [[how.times(one / how.units[0]) for one in time.tolist()]]
     columns += [(values / unit).tolist() for values, unit in zip(others, how.units[1:], strict=True)]
+    if len(how.titles) > len(columns):
+        columns.append([round(1e9 * (one % 1.0)) for one in time.tolist()])
     return list(how.titles), columns
 
 
@@ -467,6 +526,7 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     [
         ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
         ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
+        ("time,position.a\n0,1\n0.1,ERR\n", NOTHING, "column 'position.a': a cell has 'ERR', which is no number"),
         ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
         (
             "time,position.a\n" + "".join(f"{i % 200},1\n" for i in range(400)),

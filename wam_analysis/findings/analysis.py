@@ -17,7 +17,7 @@ from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
 from wam_analysis.findings.topics import topics_section
 from wam_analysis.foreign.reading import foreign_bag
-from wam_analysis.foreign.tables import RENAMED, UNUSED, series_of_csv, table_bag
+from wam_analysis.foreign.tables import RENAMED, UNUSED, series_of_csv, series_of_frame, table_bag
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
@@ -98,8 +98,7 @@ def analyse(
         if it has not what is given.
     """
     if not isinstance(source, (str, Path)):
-        series = source.reset_index() if hasattr(source, "reset_index") else source
-        bag, given = table_bag(Path("table"), series, given)
+        bag, given = table_bag(Path("table"), series_of_frame(source), given)
         return analyse_bag(bag, progress, given=given)
     path = Path(source)
     progress(f"reading {path}")

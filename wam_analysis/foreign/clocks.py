@@ -105,27 +105,31 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
 def rising(stamps: Times, received: Times) -> Times:
     """The stamps, or the times of reception where the stamps are of a clock that was set, reset or never set.
 
-    A clock was set forward where the stamps jump and the receptions, which keep the same period, do not.  A few stamps
-    that are years away from their reception, such as 0, are replaced by it.
+    A few stamps that are years away from their reception, such as 0, are replaced by it.
     """
     away = np.abs(stamps - received) > STREAM.away
     if 2 * np.count_nonzero(away) < len(stamps):
         stamps = np.where(away, received, stamps)
+    steps, arrivals = np.diff(stamps), np.diff(received)
+    if not len(steps):
+        return stamps
+    keeps_pace = abs(np.median(arrivals) - np.median(steps)) <= STREAM.pace * np.median(steps)
+    is_reset = not np.any(steps) or np.any(steps < -STREAM.reset) or (keeps_pace and _is_set(stamps, received))
+    return received if is_reset else stamps
+
+
+def _is_set(stamps: Times, received: Times) -> bool:
+    """Whether the stamps go back, or skip periods that the receptions do not, and stay as much older or newer.
+
+    A message that was late does so for a moment; delays that change at random do so within their range.
+    """
     steps = np.diff(stamps)
-    arrivals = np.diff(received)
-    keeps_pace = len(steps) > 0 and abs(np.median(arrivals) - np.median(steps)) <= STREAM.pace * np.median(steps)
-    was_set = bool(keeps_pace and np.any(steps - arrivals > STREAM.reset))
-    is_reset = np.any(steps < -STREAM.reset) or (keeps_pace and _is_set_back(stamps, received))
-    return received if was_set or is_reset or (len(steps) and not np.any(steps)) else stamps
-
-
-def _is_set_back(stamps: Times, received: Times) -> bool:
-    """Whether a stamp goes back and the later ones stay as much older, unlike one message that was late."""
-    rows = np.flatnonzero(np.diff(stamps) < 0)
+    skipped = (steps > STREAM.filled * np.median(steps)) & (steps > STREAM.filled * np.diff(received))
+    rows = np.flatnonzero((steps < 0) | skipped)
     rows = rows[(rows + 1 >= STREAM.near) & (rows + 1 <= len(stamps) - STREAM.near)]
     if not len(rows):
         return False
-    age = (received - stamps) - (received[0] - stamps[0])
-    windows = sliding_window_view(age, STREAM.near)
-    before, after = (np.median(windows[rows + at], axis=1) for at in (1 - STREAM.near, 1))
-    return bool(np.any(after - before > 0.5 * (stamps[rows] - stamps[rows + 1])))
+    windows = sliding_window_view((received - stamps) - (received[0] - stamps[0]), STREAM.near)
+    before, after = windows[rows + 1 - STREAM.near], windows[rows + 1]
+    apart = np.maximum(np.min(after, axis=1) - np.max(before, axis=1), np.min(before, axis=1) - np.max(after, axis=1))
+    return bool(np.any(2 * apart > np.abs(steps[rows])))

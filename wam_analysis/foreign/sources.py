@@ -1,7 +1,7 @@
 """One joint or one wrench of one sender and frame, and what was done to its raw values."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from itertools import takewhile
 from typing import NamedTuple
@@ -10,7 +10,7 @@ import numpy as np
 
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.reading import COMMAND
-from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import SHAFT, STREAM
@@ -146,18 +146,15 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
         is_command = bag.types.get(topic) == COMMAND
         clock, received = found_clocks[topic].times - origin, columns.log_time_ns - origin
         timed: dict[bytes, _Timed] = {}
+        senders = _senders(columns)
         for frame, own, sent in _frames(columns, clock / 1e9, is_command):
             for name, values, units in _parts(columns, given):
-                # a joint may be in some messages of a topic only, a wrench is in all
-                known = (
-                    np.isfinite(np.column_stack([*values.values()])).any(axis=1) if values else np.zeros(len(own), bool)
-                )
-                of_sender = sent & known if name else sent
+                known, of_sender = _known(values.values(), len(own)), sent & senders.get(name, True)
                 if not np.any(of_sender & own):
                     continue
                 one = timed.get(of_sender.tobytes()) or _timed(clock, received, columns, of_sender)
                 timed[of_sender.tobytes()] = one
-                mine = (own & known)[one.rows]
+                mine = (own & known if is_command or not name else own)[one.rows]
                 rows, seconds = one.rows[mine], one.time[mine]
                 taken = {q: v[rows] for q, v in values.items() if np.isfinite(v[rows]).any()}
                 away = np.unique(clock[sent & ~own] / 1e9)
@@ -165,9 +162,23 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 source = Source(
                     topic, topic, name, frame, is_command, seconds, one.time, arrived, away, taken, units, one.treated
                 )
-                if len(rows) >= (1 if is_command else SHAFT.fewest_samples):
+                if np.count_nonzero(known[rows]) >= (1 if is_command else SHAFT.fewest_samples):
                     found.append(_treated(source))
     return _labelled(found)
+
+
+def _known(values: Iterable[Numbers], number: int) -> Mask:
+    """Which of some messages have a number among the values of some quantities."""
+    return np.isfinite(np.column_stack([np.full(number, math.nan), *values])).any(axis=1)
+
+
+def _senders(columns: JointColumns | WrenchColumns) -> dict[str, Mask]:
+    """The messages of the sender of each joint: those that have it, or those in some of which alone it comes along."""
+    if isinstance(columns, WrenchColumns):
+        return {}
+    parts = {name: _known(values.values(), len(columns.stamp_ns)) for name, values, _ in _parts(columns, NOTHING_GIVEN)}
+    masks = {mask.tobytes(): mask for mask in parts.values()}.values()
+    return {name: max((one for one in masks if one[own].all()), key=np.count_nonzero) for name, own in parts.items()}
 
 
 class _Timed(NamedTuple):
@@ -186,17 +197,18 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     steps, waits = np.diff(stamps), np.diff(received[rows])
     same = steps == 0
     number, of = int(np.sum(same)), len(rows)
-    is_seldom = number <= STREAM.repeated * of
+    numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
+    twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
+    again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
+    is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
     if not (is_seldom or np.all(same)) and np.median(waits[same]) >= STREAM.paced * np.median(waits[~same]):
         return _received(rows, stamps, received, Treated(Treatment.COARSE, "", number, of))
-    if is_seldom and of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps):
+    if is_seldom and of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps[~same]):
         quantum = int(np.gcd.reduce(steps))
-        if quantum > STREAM.irregular * np.median(steps):
+        if quantum > STREAM.irregular * np.median(steps[~same]):
             return _received(rows, stamps, received, Treated(Treatment.ROUNDED, "", of, of, quantum / 1e9))
     if not number:
         return _Timed(rows, stamps / 1e9, ())
-    numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
-    twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
     if is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]:
         kept = np.concatenate([[True], ~same])
         return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(Treatment.TWICE, "", number, of),))

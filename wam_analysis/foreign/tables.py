@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.foreign.clocks import nanoseconds
+from wam_analysis.foreign.clocks import BILLION, nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
@@ -19,8 +19,10 @@ from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
 from wam_bag.columns import JOINT_FIELDS, joint_names
 
 TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](.*)[\])]\s*)?")  # and the unit behind it
+ABOVE = re.compile(r"#|sep=")  # begins a line above the titles
 ZONE = re.compile(r"(Z|[+-]\d\d:\d\d)$")  # of a time of day, behind it
 DELIMITERS = ",;\t"
+NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was not recorded
 COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
 UNUSED = "unused column"  # in place of the type of a topic
@@ -41,8 +43,8 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", "") or f"{error}; save it as text in UTF-8"
         raise BagError(f"{path} cannot be read: {reason}") from error
-    while len(lines) > 1 and lines[0].startswith("#") and not lines[1].lstrip(' "+-.')[:1].isdigit():
-        del lines[0]  # a comment above the titles, which may begin with '#', too
+    while len(lines) > 1 and ABOVE.match(lines[0]) and not lines[1].lstrip(' "+-.')[:1].isdigit():
+        del lines[0]  # a comment above the titles, which may begin with '#', too, or what names the delimiter
     head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
     if not rows:
         raise BagError(f"{path} has no row below the names of its columns")
@@ -57,6 +59,14 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         ]
     _require_once(path, head)
     return dict(zip(head, zip_longest(*rows, fillvalue=""), strict=False))
+
+
+def series_of_frame(table: Any) -> Mapping[str, Any]:
+    """Columns of a DataFrame with its index, the time if that is of dates without a name, or a map as it is."""
+    if not hasattr(table, "reset_index"):
+        return table
+    is_time = table.index.name is None and table.index.dtype.kind in "mM" and "time" not in table
+    return (table.rename_axis("time") if is_time else table).reset_index()
 
 
 def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_GIVEN) -> tuple[Bag, TopicMap]:
@@ -84,6 +94,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     if given.topics or given.commands:
         raise ValueError(f"{path} is a table and has no topics: leave out --topic and --command. {COMMANDS}")
     _require_once(path, [str(title) for title in series])
+    series, given = _with_one_time(series, given)
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     used = {one.title for columns in found.values() for one in columns} | {"index"}  # which a data frame has
@@ -106,6 +117,17 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     types = {topic: COMMAND if topic.endswith("_command") else "table" for topic in topics}
     types |= {str(one): UNUSED for one in series if str(one) not in used}
     return checked(Bag(path, topics, types, {}, {}, dict.fromkeys(topics, len(times))), given), given
+
+
+def _with_one_time(series: Mapping[str, Any], given: TopicMap) -> tuple[Mapping[str, Any], TopicMap]:
+    """A table whose time is in two columns, s and ns, with one column of it, ns, and a map that has its unit."""
+    title = given.fields.get("stamp", "")
+    parts = title.split(",")
+    if title in series or len(parts) != 2 or not all(part in series for part in parts):
+        return series, given
+    seconds, rest = (_numbers(series[part]) for part in parts)
+    others = {name: column for name, column in series.items() if name not in parts}
+    return {title: BILLION * seconds + rest, **others}, given._replace(units={**given.units, "stamp": UNITS["ns"]})
 
 
 def _topics(
@@ -172,7 +194,10 @@ class _Column(NamedTuple):
     @property
     def numbers(self) -> Numbers:
         """Its numbers in the unit that is shown."""
-        return self.factor * _numbers(self.values)
+        try:
+            return self.factor * _numbers(self.values)
+        except BagError as error:
+            raise BagError(f"column '{self.title}': {error}") from None
 
 
 def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[_Column]:
@@ -188,7 +213,8 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
     for title in series:
         whole, unit = _split(str(title))
         name = whole.removeprefix(COMMANDED)
-        if f"{name}.".startswith(f"{wanted}."):
+        begin = name[: len(wanted)]
+        if wanted == (begin if quantity in given.fields else begin.lower()) and name[len(wanted) :][:1] in ("", "."):
             if unit in UNITS and quantity in given.units and unit_of(quantity, unit) != given.scaled(quantity):
                 raise ValueError(
                     f"'{title}' has the unit {unit}, and --unit gives another one for {quantity}; leave out --unit, or "
@@ -210,11 +236,24 @@ def _split(title: str) -> tuple[str, str]:
 
 
 def _numbers(column: Any) -> Numbers:
-    """The numbers of a column, also with a decimal comma; NaN for what is none."""
+    """The numbers of a column, also with a decimal comma and separators of thousands; NaN where there is none.
+
+    Raises
+    ------
+    BagError
+        if a cell has something else.
+    """
     try:
         return np.asarray(column, np.float64)
     except (TypeError, ValueError):
-        return np.array([_number(str(one)) for one in column])
+        texts = [str(one).strip() for one in column]
+    last = next((one for one in texts if "," in one and "." in one), "")
+    of_thousands = "." if last.rfind(",") > last.rfind(".") else "," * bool(last)
+    found = [_number(one.replace(of_thousands, "")) for one in texts]
+    for text, number in zip(texts, found, strict=True):
+        if math.isnan(number) and text.lower() not in NO_NUMBER:
+            raise BagError(f"a cell has '{text}', which is no number; leave it empty")
+    return np.array(found)
 
 
 def _number(text: str) -> float:
@@ -235,7 +274,10 @@ def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     if dates.dtype.kind in "mM":
         known = ~np.isnat(dates)
         return dates[known].astype(f"{dates.dtype.kind}8[ns]").astype(np.int64), known
-    numbers = _numbers(column)
+    try:
+        numbers = _numbers(column)
+    except BagError:
+        numbers = np.full(len(dates), np.nan)
     known = np.isfinite(numbers)
     if np.any(known):
         return nanoseconds(label, numbers[known], given), known
