@@ -92,7 +92,6 @@ class CycleThresholds:
     commanded: float = 0.2  # of a cycle: a command that is smaller does not cause it
     longest_lag: float = 0.15  # s by which a joint may follow its command
     lags: int = 40  # steps of that lag at most
-    command_filters: tuple[float, ...] = (0.03, 0.1, 0.3)  # s, of the filters through which it may follow
     singular: float = 1e-8  # of the largest singular value: smaller ones of a command are rounding
     harmonics: int = 20  # of a commanded motion that are taken off before another cycle is looked for
     # of a frequency: what remains so near to the first harmonics is the command with a changing size
@@ -112,7 +111,6 @@ class CycleThresholds:
     step_quiet: float = 0.1
     step_loudest: float = 0.5  # the same, where so much smoothing would make the rise longer
     sharp: float = 4.0  # widths of the smoothing in a rise: it is longer by 2 % then
-    top: float = 0.75  # of the overshoot; what is higher belongs to the parabola through the peak
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,8 +36,7 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     """Rise, settling and overshoot of a recorded step.
 
     Noise is averaged over as many samples as it takes to bring it well below the band, or over fewer where
-    these would be a large part of the rise.  The peak is that of a parabola through its top, so that noise does
-    not add to the overshoot.
+    these would be a large part of the rise.
 
     Parameters
     ----------
@@ -70,7 +69,6 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         if width <= least or not high - low < CYCLE.sharp * width * float(time[1] - time[0]):
             break
         width = max(width // 2, least)
-    peak = _peak(time, (value - begin) / step, part)
     outside = np.flatnonzero(np.abs(part - 1.0) > band)
     if not len(outside):
         settling = 0.0
@@ -84,7 +82,7 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         final=final,
         rise=high - low,
         settling=settling,
-        overshoot=peak,
+        overshoot=max(float(np.max(part)) - 1.0, 0.0),
         ripple=ripple,
         rise_error=math.hypot(period, (high - low) * ripple / (0.8 * abs(step))),
     )
@@ -103,20 +101,3 @@ def _between(time: Numbers, value: Numbers, row: int, level: float) -> float:
     a, b = float(value[row]), float(value[row + 1])
     share = (level - a) / (b - a) if b != a else 0.0
     return float(time[row] + share * (time[row + 1] - time[row]))
-
-
-def _peak(time: Numbers, raw: Numbers, part: Numbers) -> float:
-    """Height over 1 of the largest excess: the top of a parabola through the samples about it."""
-    top = int(np.argmax(part))
-    excess = float(part[top]) - 1.0
-    if excess <= 0.0:
-        return 0.0
-    below = np.flatnonzero(part < 1.0 + CYCLE.top * excess)
-    first = int(below[below < top][-1]) + 1 if np.any(below < top) else 0
-    last = int(below[below > top][0]) if np.any(below > top) else len(part)
-    if last - first < 5 or top in (first, last - 1):
-        return excess
-    a, b, c = np.polynomial.polynomial.polyfit(time[first:last] - time[top], raw[first:last], 2)
-    if c >= 0.0:
-        return excess
-    return max(float(a - b * b / (4.0 * c)) - 1.0, 0.0)
