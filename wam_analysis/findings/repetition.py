@@ -10,7 +10,7 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Piece, Source, longest, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
-from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
+from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import amplitude_at, spectral_lines
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
@@ -136,9 +136,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if abs(frequency * one.cycle.period - 1.0) <= CYCLE.same_frequency:
             continue  # the commanded motion itself, which it does not follow linearly
-        inner = (piece.time >= one.begin) & (piece.time <= one.end)
-        error = error_of_size(piece.time[inner], rest[inner], one.cycle.period)
-        error = math.hypot(error, (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak)
+        error = (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak
         result.append(FoundCycle(one, HARMONIC if _is_harmonic(one, frequency) else LIMIT_CYCLE, error))
     return result
 
@@ -190,19 +188,8 @@ def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
     period = float(piece.time[1] - piece.time[0])
     lags = np.unique(np.round(np.linspace(0.0, CYCLE.longest_lag / period, CYCLE.lags)).astype(np.int64))
     late = [np.concatenate([np.full(lag, desired[0]), desired[: len(desired) - lag]]) for lag in lags.tolist()]
-    slow = [_slowed(desired, period / (period + tau)) for tau in CYCLE.command_filters]
-    columns = np.column_stack([np.ones(len(desired)), piece.time - piece.time[0], *late, *slow])
+    columns = np.column_stack([np.ones(len(desired)), piece.time - piece.time[0], *late])
     return value - columns @ np.linalg.lstsq(columns, value, rcond=CYCLE.singular)[0]
-
-
-def _slowed(value: Numbers, share: float) -> Numbers:
-    """A signal through a filter of the first order that takes a share of each new sample."""
-    result = np.empty(len(value))
-    last = float(value[0])
-    for i, now in enumerate(value.tolist()):
-        last += share * (now - last)
-        result[i] = last
-    return result
 
 
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:

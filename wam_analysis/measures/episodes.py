@@ -45,23 +45,18 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             if cycle is None:
                 continue
             flat = without_drift(time, value, cycle.period)
-            for may in (free, free & ~_jumps(time, value, cycle)):
-                if not np.any(may[rows]):
-                    continue
-                first, last = _extended(time, flat, rows, cycle.period, may)
-                inner = _evaluated(first, last, n, cycle.period / float(time[1] - time[0]))
-                period = _refined(time[inner], flat[inner], cycle.period)
-                both = [_cycle(time[inner], signal[inner], least, period) for signal in (value, flat)]
-                better = max(filter(None, both), key=lambda one: one.confidence, default=None)
-                goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-                if better is not None and not goes_on:
-                    found.append(Episode(float(time[first]), float(time[last - 1]), better))
-                    free[first:last] = False
-                    break
-            else:
-                if goes_on or _changes(time[inner], flat[inner], period):
-                    transients.append(_Transient(first, last, period, _width(time, period)))
-                    free[first:last] = False  # its last part is no limit cycle
+            first, last = _extended(time, flat, rows, cycle.period, free)
+            inner = _evaluated(first, last, n, cycle.period / float(time[1] - time[0]))
+            period = _refined(time[inner], flat[inner], cycle.period)
+            both = [_cycle(time[inner], signal[inner], least, period) for signal in (value, flat)]
+            better = max(filter(None, both), key=lambda one: one.confidence, default=None)
+            goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
+            if better is not None and not goes_on:
+                found.append(Episode(float(time[first]), float(time[last - 1]), better))
+                free[first:last] = False
+            elif goes_on or _changes(time[inner], flat[inner], period):
+                transients.append(_Transient(first, last, period, _width(time, period)))
+                free[first:last] = False  # its last part is no limit cycle
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
 
@@ -79,17 +74,6 @@ class _Transient(NamedTuple):
         is_next = first <= self.last + self.near and last >= self.first - self.near
         is_alike = abs(cycle.period / self.period - 1.0) < CYCLE.same_period
         return is_next and is_alike and min(cycle.growth, 1.0 / cycle.growth) < CYCLE.steady
-
-
-def _jumps(time: Numbers, value: Numbers, cycle: LimitCycle) -> Mask:
-    """Where the mean over a period is other than that over the period before by more than half of a cycle's size."""
-    width = max(round(cycle.period / float(time[1] - time[0])), 1)
-    total = np.concatenate([[0.0], np.cumsum(value)])
-    means = (total[width:] - total[:-width]) / width
-    away = np.abs(means[width:] - means[:-width]) > 0.5 * cycle.peak_to_peak
-    jumps = np.zeros(len(value), dtype=np.bool_)
-    jumps[width : width + len(away)] = away
-    return np.convolve(jumps, np.ones(2 * width + 1), "same") > 0.5
 
 
 def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan) -> LimitCycle | None:

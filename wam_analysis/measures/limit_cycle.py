@@ -98,22 +98,6 @@ def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
     return _fold(value - np.mean(value), time / period % 1.0, phases).size
 
 
-def error_of_size(time: Numbers, value: Numbers, period: float) -> float:
-    """How far the size of the mean cycle may be off by what does not repeat with it: that of the median cycle is.
-
-    Parameters
-    ----------
-    time : (n,), s.
-    value : (n,), the signal without drift.
-    period : s.
-    """
-    cells = max(min(CYCLE.phases, len(value) // CYCLE.phase_samples) // 4, 2)
-    cell = np.minimum((time / period % 1.0 * cells).astype(np.int64), cells - 1)
-    parts = [value[cell == i] for i in range(cells)]
-    sizes = [float(np.ptp([middle(part) for part in parts if len(part)])) for middle in (np.mean, np.median)]
-    return abs(sizes[1] - sizes[0])
-
-
 class CycleExtent(NamedTuple):
     """Peak to peak, in the unit of the signal, and period, s, of a cycle; NaN if there is none."""
 
