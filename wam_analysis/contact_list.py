@@ -79,6 +79,11 @@ class ListedContact(NamedTuple):
     latency: float = NAN
 
     @property
+    def is_false(self) -> bool:
+        """Whether nothing was touched."""
+        return self.true == NO_LINK
+
+    @property
     def position_error(self) -> float:
         """Estimated less true position, m; NaN where either is unknown or the link is another one."""
         return self.estimate.position - self.true_position if self.true == self.estimate.link else NAN

@@ -1,6 +1,7 @@
 """The constant forces that were commanded in a run, each within one step of the scenario."""
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -9,6 +10,8 @@ from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import HOLD
 from wam_analysis.traces import Traces
+from wam_control.force.contact_place import pinned_position
+from wam_description.signals import ForceCommand
 from wam_sim.reactions import RecordedReaction, of_force_loop, within
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 
@@ -49,7 +52,9 @@ def _forces(run: RecordedRun, steps: Sequence[RecordedStep]) -> Iterator[Hold]:
     period = int(np.median(np.diff(commands.stamp_ns))) if len(frames) > 1 else 0
     for a, b in itertools.pairwise(bounds):
         begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
-        yield Hold(begin, end, str(frames[a]), commands.force[a])
+        command = ForceCommand(str(frames[a]), tuple(commands.force[a].tolist()), tuple(commands.torque[a].tolist()))
+        _, position = pinned_position(command) or ("", math.nan)
+        yield Hold(begin, end, command.frame, commands.force[a], position=position)
 
 
 def _forces_of_tasks(steps: Sequence[RecordedStep], tasks: Sequence[Hold]) -> Iterator[Hold]:

@@ -1,5 +1,6 @@
 """Forces that a task commands, each as long as it was commanded, and what was measured of it."""
 
+import math
 from collections.abc import Iterable
 from itertools import groupby
 from typing import NamedTuple
@@ -28,6 +29,7 @@ class Hold(NamedTuple):
     frame : of the force, 'base' or a cover.
     force : (3,), N, of the arm on the world, in that frame.
     cover : on which a task commands it, '' where none does.
+    position : where the command pins it, m along its cover; NaN where it does not.
     axis : of a task with several forces, from 0; -1 where it is the only force.
     name : of the scenario's step, or the force.
     disturbed : whether the scenario pushed the arm meanwhile.
@@ -39,6 +41,7 @@ class Hold(NamedTuple):
     frame: str
     force: Numbers
     cover: str = ""
+    position: float = math.nan
     axis: int = -1
     name: str = ""
     disturbed: bool = False
@@ -96,7 +99,15 @@ def _of(task: TaskCommand, begin: int, end: int) -> list[Hold]:
         (i, axis) for i, axis in enumerate(task.axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value
     ]
     return [
-        Hold(begin, end, task.frame, np.array(axis.direction) * axis.value, axis.cover, i if len(forces) > 1 else -1)
+        Hold(
+            begin,
+            end,
+            task.frame,
+            np.array(axis.direction) * axis.value,
+            axis.cover,
+            math.nan if axis.position is None else axis.position,
+            i if len(forces) > 1 else -1,
+        )
         for i, axis in forces
     ]
 

@@ -130,6 +130,7 @@ class HoldThresholds:
     typical_press: float = 10.0  # N, of a press
     certain: float = 0.1  # left side of (5.11) up to which (5.8) and (5.9) are exact enough for a comparison
     force_tolerance: float = 10.0  # % of the commanded force
+    arrival: float = 0.5  # s after a step, in which the arm, which follows late, may still come to its posture
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,15 +1,14 @@
 """Section about the estimated contacts, compared with the true ones."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, ListedContact
-from wam_analysis.findings.finding import Finding, Section, shown, stated, times
-from wam_analysis.measures.runs import runs
+from wam_analysis.contact_list import NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, ListedContact
+from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import TOUCH
+from wam_analysis.thresholds import SHAFT, TOUCH
 
 BLIND = "Contacts while the brakes hold are not compared: without joint sensors they are not detected."
 
@@ -21,7 +20,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
     lacking = recording.run.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
+    wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences, *_contradicted(recording)]
     shows: list[str] = []
     named = [f"{number} {one.step}" for number, one in enumerate(recording.contacts, 1) if one.step]
     sentences += [f"Contacts by number and step: {', '.join(named)}."] if named else []
@@ -53,17 +52,13 @@ def contact_section(recording: AnalysedRecording) -> Section:
         ]
         shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
     if np.any(known):
-        count = len(runs(traces.is_false))
         seconds = float(np.sum(traces.is_false)) * traces.period
-        findings.append(Finding("false detections", "s", seconds, note=times(count)))
-        if count:
-            part = traces.false_percent
-            share = f"{shown(seconds, 's')} or {part:.1f} % of the time without contact"
-            sentences.append(f"False detections: {count}, together {share}.")
-            if part > TOUCH.false_tolerance:
-                wrong.insert(0, sentences[-1])
-            else:
-                shows.append(sentences[-1])
+        findings.append(
+            Finding("estimated without a contact", "s", seconds, note="false contacts, and the ends of others")
+        )
+        if count := sum(one.is_false for one in recording.contacts):
+            share = f"False contacts: {count} of {len(recording.contacts)}."
+            (wrong if traces.false_percent > TOUCH.false_tolerance else shows).append(share)
     elif recording.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
         shows.append(f"Contacts: {len(recording.contacts)} estimated; the true ones are not in this bag.")
@@ -75,21 +70,49 @@ def contact_section(recording: AnalysedRecording) -> Section:
 
 def contact_numbers(recording: AnalysedRecording) -> Iterator[Finding]:
     """Every estimated contact in numbers."""
-    for number, contact in enumerate(recording.contacts, 1):
-        yield from _numbers(f"{number} {contact.estimate.link}", contact, recording.traces.period)
+    for name, contact in named_contacts(recording.contacts):
+        yield from _numbers(name, contact, recording.traces.period, declared_position(recording, contact))
 
 
 def contact_doubts(recording: AnalysedRecording) -> Iterator[str]:
     """What is not to be trusted of the estimated contacts."""
-    for number, contact in enumerate(recording.contacts, 1):
-        yield from _doubts(f"{number} {contact.estimate.link}", contact)
+    for name, contact in named_contacts(recording.contacts):
+        yield from _doubts(name, contact)
     if any(math.isnan(contact.estimate.probability) for contact in recording.contacts):
         yield NOT_CERTAIN
     if not all(contact.estimate.is_placed for contact in recording.contacts):
         yield f"Positions of contacts: {NOT_PLACED}."
 
 
-def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Finding]:
+def named_contacts(contacts: Sequence[ListedContact]) -> Iterator[tuple[str, ListedContact]]:
+    """Each estimated contact with its number and link; one where nothing was touched is marked as false."""
+    for number, one in enumerate(contacts, 1):
+        yield f"{number} {one.estimate.link}{' false' * one.is_false}", one
+
+
+def declared_position(recording: AnalysedRecording, contact: ListedContact) -> float:
+    """Where the command or the parameters pin the force of a contact, m along its link; NaN where they do not."""
+    link, zero, loop = contact.estimate.link, recording.traces.zero, recording.parameters.force_loop
+    for hold in recording.holds:
+        middle = (0.5 * (hold.begin + hold.end) - zero) / 1e9
+        if contact.begin <= middle < contact.end and link == (hold.cover or hold.frame):
+            is_pinned = loop is not None and loop.contact_source == "pinned" and loop.contact_cover == link
+            return loop.contact_position if loop and is_pinned and math.isnan(hold.position) else hold.position
+    return math.nan
+
+
+def _contradicted(recording: AnalysedRecording) -> Iterator[str]:
+    """Declared positions of which the estimated ones are further away than both standard deviations explain."""
+    loop = recording.parameters.force_loop
+    for name, one in named_contacts(recording.contacts):
+        declared, found = declared_position(recording, one), one.estimate
+        sd = math.hypot(found.position_sd, loop.contact_position_sd if loop else 0.0)
+        if abs(found.position - declared) > SHAFT.sigmas * sd:
+            at = f"{100.0 * found.position:.3g} +- {100.0 * found.position_sd:.2g} cm"
+            yield f"{name}: its position is declared at {100.0 * declared:.3g} cm, but estimated at {at}."
+
+
+def _numbers(name: str, contact: ListedContact, period: float, declared: float) -> Iterator[Finding]:
     """A contact in numbers, those that are compared with the true ones last."""
     cm = 100.0
     yield Finding(f"{name}: from", "s", contact.begin)
@@ -97,6 +120,7 @@ def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Findi
     one = contact.estimate
     yield Finding(f"{name}: probability of the link", "%", 100.0 * one.probability)
     yield Finding(f"{name}: position along the link", "cm", cm * one.position, error=cm * one.position_sd)
+    yield Finding(f"{name}: declared position", "cm", cm * declared)
     least = "lower bound: the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
@@ -114,9 +138,8 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     if contact.estimate.lasting < TOUCH.steady_link:
         yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
     yield from (f"{name}: {reason}." for reason in contact.estimate.reasons)
-    if contact.true not in ("", contact.estimate.link):
-        touched = "a false detection, nothing" if contact.true == NO_LINK else contact.true
-        yield f"{name}: {touched} was touched."
+    if contact.true not in ("", contact.estimate.link) and not contact.is_false:
+        yield f"{name}: {contact.true} was touched."
 
 
 def _errors(away: float, off: float) -> str:

@@ -71,16 +71,16 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     """How far the held forces were from the commanded ones, in a sentence."""
     held = [one for one in held if not one.hold.is_short]
-    known = [(one, accuracy.bias) for one in held if math.isfinite((accuracy := _accuracy(one)).bias)]
+    known = [(one, accuracy.smallest) for one in held if math.isfinite((accuracy := _accuracy(one)).smallest)]
     if not known:
         return ()
-    applied = [(one, bias) for one, bias in known if _has_touched(one)]
+    applied = [(one, error) for one, error in known if _has_touched(one)]
     free = ", ".join(one.hold.name for one, _ in known if not _has_touched(one))
     text = f"Forces: {len(applied)} of {len(held)} applied"
     if applied:
-        worst, bias = max(applied, key=lambda item: abs(item[1]) / item[0].hold.commanded)
+        worst, error = max(applied, key=lambda item: item[1] / item[0].hold.commanded)
         whose = "" if len(worst.true) else "measured "
-        text += f", largest {whose}error {100.0 * bias / worst.hold.commanded:+.1f} %"
+        text += f", largest {whose}error {100.0 * error / worst.hold.commanded:.1f} %"
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 
 

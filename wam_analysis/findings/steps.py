@@ -7,12 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK
 from wam_analysis.findings.finding import Section, stated
 from wam_analysis.findings.held_force import HeldForce
+from wam_analysis.held_messages import by_names, joint_angles, row_at
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, TOUCH
 from wam_analysis.unplanned_contact import LIMIT
+from wam_control.thresholds import MOTION
+from wam_description.event import Code
 from wam_sim.reactions import OUTCOMES, STEADY, unmet
 
 HOW = (
@@ -60,7 +62,8 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     missed = {what: outcomes[what] for what in OUTCOMES[1:] if outcomes[what]}
     wrong += [stated(f"{what} at the end of: {'; '.join(steps)}") for what, steps in missed.items()]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
-    return Section("steps", "Result of the steps", (HOW, *(f"{answer}." for answer in answers)), wrong=wrong)
+    stated_answers = (HOW, *(f"{answer}." for answer in answers)) if answers else ("Nothing in them can be evaluated.",)
+    return Section("steps", "Result of the steps", stated_answers, wrong=wrong)
 
 
 def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
@@ -74,12 +77,14 @@ def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
 
 
 def verdict(recording: AnalysedRecording) -> tuple[VerdictAnswer, ...]:
-    """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
+    """Whether postures, forces and contacts were right, each with its worst value, and what was too hard in motion."""
+    brief = _brief(recording)
+    has_contacts = bool(recording.contacts or recording.touched)
     answers = (
-        _force_verdict(recording.held, _brief(recording)),
+        *_posture_verdict(recording),
+        *([_force_verdict(recording.held, brief)] if recording.held or brief else []),
         *_command_verdict(recording),
-        _link_verdict(recording),
-        _position_verdict(recording),
+        *([_link_verdict(recording), _position_verdict(recording)] if has_contacts else []),
         *_false_verdict(recording),
     )
     hard, unknown = recording.unplanned
@@ -88,6 +93,44 @@ def verdict(recording: AnalysedRecording) -> tuple[VerdictAnswer, ...]:
         worst = max(hard, key=lambda one: one.force)
         return *answers, VerdictAnswer(f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{worst.force:.0f} N")
     return *answers, *[VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")][: bool(unknown)]
+
+
+def _posture_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
+    """Whether the arm came to each commanded posture; none without one."""
+    errors = _posture_errors(recording)
+    if not errors:
+        return []
+    missed = {name: error for name, error in errors.items() if error > MOTION.arrived}
+    worst = max(errors, key=lambda name: errors[name])
+    listed = missed or {worst: errors[worst]}
+    result = VerdictResult.NO if missed else VerdictResult.YES
+    shown = ", ".join(f"{name} {error:.2g} rad" for name, error in listed.items())
+    return [VerdictAnswer(f"posture within {MOTION.arrived:g} rad", result, shown)]
+
+
+def _posture_errors(recording: AnalysedRecording) -> dict[str, float]:
+    """How close all joints came to the posture of each step that moved it without a force or a task, rad, by its name.
+
+    At the end of the step or soon after; of a step that was not played to its end nothing is known.
+    """
+    run, arm, traces = recording.run, recording.parameters.arm, recording.traces
+    command = run.joints("joint_posture_command")
+    commanded = None if arm is None else by_names(command, "position", arm.joints.names)
+    angles = None if arm is None else joint_angles(run, arm)
+    if command is None or commanded is None or angles is None:
+        return {}
+    tasks = [(begin, end) for task, begin, end in recording.tasks if task.axes]
+    errors: dict[str, float] = {}
+    for step in run.steps if recording.outcome == Code.DONE else run.steps[:-1]:
+        before, last = np.searchsorted(command.stamp_ns, [step.begin, step.end]) - 1
+        is_still = last <= before or np.abs(commanded[last] - commanded[max(before, 0)]).max() <= MOTION.arrived
+        is_forced = np.any(traces.during(step.begin, step.end) & traces.commanded.acts)
+        if is_still or is_forced or any(step.begin < end and begin < step.end for begin, end in tasks):
+            continue
+        first, after = row_at(angles[0], np.array([step.end, step.end + round(1e9 * HOLD.arrival)]))
+        off = np.abs(angles[1][first : after + 1] - commanded[last]).max(axis=1)
+        errors[step.name] = max(errors.get(step.name, 0.0), float(off.min()))
+    return errors
 
 
 def _brief(recording: AnalysedRecording) -> int:
@@ -132,13 +175,13 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
 
 def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
-    found = [one for one in recording.contacts if one.true != NO_LINK]  # no false detections
-    errors = [100.0 * abs(one.position_error) for one in found if not one.estimate.is_lower_bound]
+    found = [(number, one) for number, one in enumerate(recording.contacts, 1) if not one.is_false]
+    errors = [100.0 * abs(one.position_error) for _, one in found if not one.estimate.is_lower_bound]
     errors += [math.nan] * sum(one.lasts for one in recording.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
-    unknown = sum(one.estimate.is_lower_bound for one in found)
+    unknown = [str(number) for number, one in found if one.estimate.is_lower_bound]
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{:.1f} cm")
-    return answer._replace(remark=f"unknown for {unknown} of {len(found)} contacts" * bool(unknown))
+    return answer._replace(remark=f"not known for contact {', '.join(unknown)}" * bool(unknown))
 
 
 def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
@@ -147,7 +190,7 @@ def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     part, seconds = traces.false_percent, np.count_nonzero(traces.is_false) * traces.period
     if math.isnan(part):
         return []
-    question = f"false detections for at most {TOUCH.false_tolerance:g} % of the time without contact"
+    question = f"contact estimated for at most {TOUCH.false_tolerance:g} % of the time without one"
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]
