@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
@@ -35,7 +36,7 @@ from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
 from wam_sim.batch import processes
-from wam_sim.pieces import default_file
+from wam_sim.pieces import default_file, sources
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, percent
 from wam_studies.figures.catalogue import table as figures_table
@@ -380,7 +381,10 @@ def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
         if done.returncode:
             raise SystemExit(f"the demonstration failed, see above; docs/{kept}.* are unchanged")
         report = done.stdout[done.stdout.index("Verdict\n") :].partition("\nProvenance")[0].rstrip()
-        (ROOT / "docs" / f"{kept}.txt").write_text(report + "\n", encoding="utf-8")
+        command = f"wam demo --no-live --real-time-factor 0 --config {Path(name).stem}"
+        code = sources(None)[:12]
+        origin = f"Written by `{command}` on {datetime.now(UTC):%Y-%m-%d}, code and configuration `{code}`."
+        (ROOT / "docs" / f"{kept}.txt").write_text(f"{origin}\n\n{report}\n", encoding="utf-8")
         if is_moving:
             moving_picture.save(Path(folder) / "demo", ROOT / "docs" / f"{kept}.webp")
     print(*(f"docs/{kept}{ending}" for ending in (".txt", *[".webp"] * is_moving)), sep="\n", flush=True)
