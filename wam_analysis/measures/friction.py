@@ -163,12 +163,11 @@ def _robust(
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
     """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
 
-    The averages of `width` samples overlap, so the errors count at most one sample in `width`, and fewer where what is
-    left over is alike for longer.  What the law leaves out, such as creep of the cables, is similar within a motion and
-    not noise: if the halves of motions, numbered by `half`, differ by more than the noise explains, their difference is
-    the error (jackknife).  A factor that the samples which are left do not determine has an infinite error.  What
-    `waves`, (n, k), of unknown size would add to each factor is in its error: where the same angles return, neither the
-    rest of the fit nor the halves show it.
+    The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such as
+    creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`, differ by
+    more than the noise explains, their difference is the error (jackknife).  A factor that the samples which are left do
+    not determine has an infinite error.  What `waves`, (n, k), of unknown size would add to each factor is in its error:
+    where the same angles return, neither the rest of the fit nor the halves show it.
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     keep = np.ones(len(wanted), dtype=np.bool_)
@@ -186,8 +185,7 @@ def _robust(
     a = columns[keep][:, used] / scale[used]
     products = a.T @ a
     inverse = np.linalg.pinv(products)
-    alike = max(float(width), _correlation_length(rest[keep]))
-    freedom = max(len(a) / alike - len(used), SHAFT.freedom)
+    freedom = max(len(a) / width - len(used), SHAFT.freedom)
     covariance = inverse * float(np.sum(rest[keep] ** 2)) / freedom
     noisy = _few(freedom) * np.sqrt(np.diag(covariance))
     noisy[_undetermined(products)] = math.inf
@@ -225,19 +223,6 @@ def _undetermined(products: Numbers) -> Mask:
     values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
     free = vectors[:, values < values[-1] / SHAFT.singular]
     return np.asarray(np.any(np.abs(free) > SHAFT.undetermined, axis=1), np.bool_)
-
-
-def _correlation_length(rest: Numbers) -> float:
-    """Samples in which a sequence has one independent value: the sum of its autocorrelation up to its first zero."""
-    rest = rest - np.mean(rest)
-    power = float(rest @ rest)
-    if not power > 0.0:
-        return 1.0
-    n = len(rest)
-    transform = np.fft.rfft(rest, 2 * n)
-    correlation = np.fft.irfft(transform * transform.conj(), 2 * n)[:n] / power
-    ends = np.flatnonzero(correlation <= 0.0)
-    return 2.0 * float(np.sum(correlation[: ends[0] if len(ends) else n])) - 1.0
 
 
 def _halves(rows: Index) -> Rows:
