@@ -19,7 +19,7 @@ from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import CUT
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
-from wam_description.status import ENABLED, diagnosed_name
+from wam_description.status import diagnosed_name
 from wam_sim.reactions import SETTLING_TIME, RecordedReaction, too_short, unassessed, watched_times
 from wam_sim.recorded_run import RecordedStep, messages_of, recorded_run, status_of
 
@@ -228,16 +228,8 @@ class AnalysedRecording:
     @cached_property
     def blind(self) -> Mask:
         """Whether nothing can be estimated at each instant: under the brakes, where the motors alone are observed."""
-        blind = np.zeros(len(self.traces.stamp), dtype=bool)
-        try:
-            if self.run.parameters.node("contact_estimator").get("use_joint_sensors", True):
-                return blind
-        except BagError:
-            return blind
-        for stamp, status in self.run.stamped_statuses():
-            if status.node == "driver" and status.mode:
-                blind[self.traces.stamp >= stamp] = status.mode != ENABLED
-        return blind
+        estimator = self.run.parameters.nodes.get("contact_estimator", {})
+        return self.run.braked(self.traces.stamp) & (not estimator.get("use_joint_sensors", True))
 
     @cached_property
     def touched(self) -> tuple[TouchedLink, ...]:

@@ -6,6 +6,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from wam_bag.arrays import Mask, Times
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code, Event, Level
@@ -143,13 +146,20 @@ class RecordedRun(NamedTuple):
         faults = [
             (stamp, [Event(Code.FAULT, Level.ERROR, {"reason": fault})] if fault else []) for stamp, fault in driver
         ]
-        modes = sorted((stamp, status.mode) for stamp, status in found if status.node == "driver" and status.mode)
-
-        def is_braked(stamp: int) -> bool:
-            return next((mode for since, mode in reversed(modes) if since <= stamp), ENABLED) != ENABLED
-
-        pushed = [one for one in lasting(loop, end) if one.name is not Code.PUSHED or not is_braked(one.begin)]
+        own = lasting(loop, end)
+        braked = self.braked(np.array([one.begin for one in own], np.int64))
+        pushed = [one for one, held in zip(own, braked, strict=True) if one.name is not Code.PUSHED or not held]
         return tuple(sorted((*pushed, *lasting(faults, end)), key=lambda one: (one.begin, one.end, one.name)))
+
+    def braked(self, stamps: Times, release: int = 0) -> Mask:
+        """Whether the brakes hold at each instant, (k,), and for a time after each release, ns."""
+        braked = np.zeros(len(stamps), np.bool_)
+        driver = [
+            (at, status.mode) for at, status in self.stamped_statuses() if status.node == "driver" and status.mode
+        ]
+        for since, mode in sorted(driver):
+            braked[stamps >= since + release * (mode == ENABLED)] = mode != ENABLED
+        return braked
 
     def lacking(self, *names: str) -> tuple[str, ...]:
         """Those of some topics that were not recorded; of what was refused that is known."""

@@ -78,7 +78,7 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
     forward = np.concatenate(([True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]))  # time that a reset repeats
     rows = np.flatnonzero(np.all(np.isfinite(at_joints), axis=1) & forward)
     matrix = TransmissionMap.of(arm).joint_from_motor
-    use = ~_braked(run, stamps[rows])
+    use = ~run.braked(stamps[rows], SHAFT.release)  # not before the cables have taken the load
     caveats: tuple[str, ...] = ()
     if load_from == GRAVITY:
         touched = _touched(run, stamps[rows])
@@ -99,21 +99,6 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
         strain=strain[0][rows],
         caveats=caveats,
     )
-
-
-def _braked(run: RecordedRun, stamps: Times) -> Mask:
-    """Whether the brakes held, which is not friction; extended until the cables have taken the load."""
-    braked = np.zeros(len(stamps), dtype=np.bool_)
-    since: int | None = None
-    for status in run.statuses:
-        if status.node != "driver" or not status.mode or not status.stamp:
-            continue
-        if status.mode == "enabled" and since is not None:
-            braked |= (stamps >= since) & (stamps < status.stamp + SHAFT.release)
-            since = None
-        elif status.mode != "enabled" and since is None:
-            since = status.stamp
-    return braked if since is None else braked | (stamps >= since)
 
 
 def _touched(run: RecordedRun, stamps: Times) -> Mask:
