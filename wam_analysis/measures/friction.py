@@ -163,11 +163,11 @@ def _robust(
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
     """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
 
-    The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such as
-    creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`, differ by
-    more than the noise explains, their difference is the error (jackknife).  A factor that the samples which are left do
-    not determine has an infinite error.  What `waves`, (n, k), of unknown size would add to each factor is in its error:
-    where the same angles return, neither the rest of the fit nor the halves show it.
+    The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such
+    as creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`,
+    differ by more than the noise explains, their difference is the error (jackknife).  A factor that the samples which
+    are left do not determine has an infinite error.  What `waves`, (n, k), of unknown size would add to each factor is
+    in its error: where the same angles return, neither the rest of the fit nor the halves show it.
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     keep = np.ones(len(wanted), dtype=np.bool_)
