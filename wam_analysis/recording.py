@@ -179,7 +179,7 @@ class AnalysedRecording:
     def reactions(self) -> tuple[RecordedReaction, ...]:
         """Those of the force loop to what was commanded, and faults of the driver."""
         ends = [int(stamp) for stamp in self.traces.stamp[-1:]] + [step.end for step in self.steps[-1:]]
-        return tuple(self.traces.with_forces(one) for one in self.run.reactions(max(ends, default=0)))
+        return self.run.reactions(max(ends, default=0))
 
     @cached_property
     def holds(self) -> tuple[Hold, ...]:

@@ -10,10 +10,8 @@ from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import TOUCH
 from wam_bag.arrays import Mask, Names, Numbers, Times
 from wam_description.arm import Arm
-from wam_description.event import Code
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
-from wam_sim.reactions import RecordedReaction
 from wam_sim.recorded_run import RecordedRun
 
 _Points = tuple[Times, Numbers]  # stamps, ns, and positions along a link, m, (k,)
@@ -128,25 +126,6 @@ class Traces(NamedTuple):
     def during(self, begin: int, end: int) -> Mask:
         """The instants from begin up to end, ns."""
         return (self.stamp >= begin) & (self.stamp < end)
-
-    def with_forces(self, reaction: RecordedReaction) -> RecordedReaction:
-        """A reaction to what pushes, with how hard it did at most and in the end; its reason is of its first moment.
-
-        It ends where the loop no longer knows of more than is allowed; a push that it does not estimate may go on.
-        """
-        rows = np.flatnonzero(self.during(reaction.begin, reaction.end))
-        sizes = {name: signal.size for name, signal in (("true", self.true), ("estimated", self.estimated))}
-        known = {name: size for name, size in sizes.items() if np.any(size[rows] > 0.0)}
-        if reaction.name is not Code.PUSHED or not known:
-            return reaction
-        hardest = {name: rows[np.nanargmax(size[rows])] for name, size in known.items()}
-        largest = [
-            f"{known[name][row]:.3g} N ({name}, at {(self.stamp[row] - self.zero) / 1e9:.2f} s)"
-            for name, row in hardest.items()
-        ]
-        left = [f"{size[rows[-1]]:.3g} N ({name})" for name, size in known.items() if size[rows[-1]] > 0.0]
-        remark = f"; the largest force until its end: {', '.join(largest)}; at its end: {', '.join(left) or 'none'}"
-        return reaction._replace(remark=remark)
 
 
 def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold] = ()) -> Traces:

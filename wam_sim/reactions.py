@@ -25,13 +25,11 @@ class RecordedReaction(NamedTuple):
     ----------
     begin, end : ns.
     event : what was reported, with the values of its start.
-    remark : what else is known of it, in words.
     """
 
     begin: int
     end: int
     event: Event
-    remark: str = ""
 
     @property
     def name(self) -> Code:
@@ -41,7 +39,7 @@ class RecordedReaction(NamedTuple):
     @property
     def reason(self) -> str:
         """In words."""
-        return sentence(self.event) + self.remark
+        return sentence(self.event)
 
     @property
     def holds(self) -> bool:

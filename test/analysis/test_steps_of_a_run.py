@@ -463,24 +463,6 @@ def test_a_push_or_a_commanded_force_is_not_unplanned():
     assert AnalysedRecording(with_limits(recording)).unplanned.hard == ()
 
 
-def test_a_reaction_to_what_pushes_states_how_hard_it_became():
-    """The reason is that of its first moment."""
-    recording = Played()
-    recording.set(recording.true, 9.3, 9.8, "outer_link", (0.0, 89.0, 0.0), 0.25)
-    recording.set(recording.true, 9.6, 9.7, "outer_link", (0.0, 157.0, 0.0), 0.25)
-    recording.set(recording.estimated, 9.3, 9.8, "outer_link", (0.0, 85.0, 0.0), 0.25)
-    bag = with_limits(recording)
-    largest = "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)"
-    assert f"{largest}; at its end: none" in told(bag)
-    for series, newtons in ((recording.true, 155.0), (recording.estimated, 11.0)):
-        recording.set(series, 9.7, 10.0, "outer_link", (0.0, newtons, 0.0), 0.25)
-    ended = status("force_loop", "", stamp=str(START + 9900 * MS))
-    bag = with_limits(recording)
-    stated = messages([*bag.topics["/wam/status"].messages, ended])
-    bag = bag._replace(topics={**bag.topics, "/wam/status": stated})
-    assert f"{largest}; at its end: 155 N (true), 11 N (estimated)" in told(bag)
-
-
 @pytest.mark.slow
 def test_a_failed_task_leaves_a_report(tmp_path, capsys):
     steps = [
@@ -689,7 +671,7 @@ def test_missing_topic_is_said_and_nothing_is_invented(name):
     if name == "sim/contact/wrench":
         assert "force within 10 %: NOT EVALUATED | correct link: NOT EVALUATED" in verdict(summary)
     if name == "contact/wrench":
-        assert all(math.isnan(held.estimated_accuracy.bias) for held in summary.held)
+        assert all(math.isnan(held.accuracy["estimated"].bias) for held in summary.held)
 
 
 def test_a_section_that_asks_for_a_topic_that_was_not_read_is_told_so():
