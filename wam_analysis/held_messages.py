@@ -1,5 +1,7 @@
 """Messages at other times: which is held, where a topic has none, and joints in the order of some names."""
 
+from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +35,21 @@ def held_rows(stamps: Times, base: Times) -> tuple[Index, Mask]:
 def rows_before_gaps(stamps: Times) -> Index:
     """Rows of the messages after which none comes for longer than one is held."""
     return np.flatnonzero(np.diff(stamps) > held_for(stamps))
+
+
+def intervals(stamps: Times, changes: Mask) -> Iterator[tuple[int, int, int]]:
+    """Row, begin and end, ns, of each time in which one command comes: until it changes, or does not come any more.
+
+    Parameters
+    ----------
+    stamps : (n,), ns.
+    changes : (n - 1,), whether each message but the first commands something else than the one before.
+    """
+    last = np.append(changes, True)
+    last[rows_before_gaps(stamps)] = True
+    period = int(np.median(np.diff(stamps))) if len(stamps) > 1 else 0
+    for first, after in pairwise([0, *(np.flatnonzero(last) + 1).tolist()]):
+        yield first, int(stamps[first]), int(stamps[after - 1]) + period
 
 
 def with_holes(stamps: Times) -> Times:

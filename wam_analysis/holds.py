@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.held_messages import rows_before_gaps
+from wam_analysis.held_messages import intervals
 from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import HOLD
 from wam_analysis.traces import Traces
@@ -45,16 +45,13 @@ def _forces(run: RecordedRun, steps: Sequence[RecordedStep]) -> Iterator[Hold]:
         return
     frames = np.array(commands.frames)
     changed = np.any(np.abs(np.diff(commands.force, axis=0)) > HOLD.equal_force, axis=1) | (frames[1:] != frames[:-1])
-    starts = np.searchsorted(commands.stamp_ns, [step.begin for step in steps])
-    gaps = (rows_before_gaps(commands.stamp_ns) + 1).tolist()
-    inner = {*(np.flatnonzero(changed) + 1).tolist(), *starts.tolist(), *gaps} - {0, len(frames)}
-    bounds = [0, *sorted(inner), len(frames)]
-    period = int(np.median(np.diff(commands.stamp_ns))) if len(frames) > 1 else 0
-    for a, b in itertools.pairwise(bounds):
-        begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
-        command = ForceCommand(str(frames[a]), tuple(commands.force[a].tolist()), tuple(commands.torque[a].tolist()))
+    starts = np.searchsorted(commands.stamp_ns, [step.begin for step in steps]) - 1
+    changed[starts[(starts >= 0) & (starts < len(changed))]] = True
+    for row, begin, end in intervals(commands.stamp_ns, changed):
+        force, torque = (each[row] for each in (commands.force, commands.torque))
+        command = ForceCommand(str(frames[row]), tuple(force.tolist()), tuple(torque.tolist()))
         _, position = pinned_position(command) or ("", math.nan)
-        yield Hold(begin, end, command.frame, commands.force[a], position=position)
+        yield Hold(begin, end, command.frame, force, position=position)
 
 
 def _forces_of_tasks(steps: Sequence[RecordedStep], tasks: Sequence[Hold]) -> Iterator[Hold]:

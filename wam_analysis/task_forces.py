@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterable
-from itertools import groupby
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import rows_before_gaps
+from wam_analysis.held_messages import intervals
 from wam_bag.arrays import Numbers, Times
 from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
@@ -73,18 +73,10 @@ def tasks_of(run: RecordedRun, arm: Arm | None) -> list[RecordedTask]:
     columns = run.table("task_command")
     if columns is None or arm is None:
         return []
-    stamps = columns.stamp_ns.tolist()
-    gaps = rows_before_gaps(columns.stamp_ns)
-    stretch = np.searchsorted(gaps, np.arange(len(stamps))).tolist()
-    messages = zip(stamps, tables(columns), stretch, strict=True)
-    parts = [next(part) for _, part in groupby(messages, lambda one: (str(one[1]), one[2]))]
-    lasts = [*(stamps[row] for row in gaps), stamps[-1]]  # of each stretch
-    ends = [*(begin for begin, *_ in parts[1:]), stamps[-1]]
-    return [
-        (task, begin, min(end, lasts[number]))
-        for (begin, table, number), end in zip(parts, ends, strict=True)
-        if (task := _task(table, arm)) is not None
-    ]
+    every = list(tables(columns))
+    changes = np.array([one != before for before, one in pairwise(map(str, every))], np.bool_)
+    found = ((_task(every[row], arm), begin, end) for row, begin, end in intervals(columns.stamp_ns, changes))
+    return [(task, begin, end) for task, begin, end in found if task is not None]
 
 
 def _task(table: Table, arm: Arm) -> TaskCommand | None:
