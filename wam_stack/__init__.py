@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.analysis import analyse as _analyse
-from wam_analysis.identification.contradictions import contradictions, sentence
+from wam_analysis.identification.contradictions import contradictions
 from wam_analysis.identification.fit import identify as _identify
 from wam_analysis.identification.motion import recorded_motion
 from wam_analysis.identification.overlay import model_values
@@ -144,7 +144,7 @@ def identify(bag: str | Path, configuration: Named = "wam") -> IdentifiedModel:
     shared = _loaded(configuration).shared
     motion = recorded_motion(recorded_run(read(bag, may_lack=True)), shared.arm)
     found = _identify(shared, motion)
-    against = [sentence(one) for one in contradictions(shared, motion, found)]
+    against = list(map(str, contradictions(shared, motion, found)))
     return IdentifiedModel(model_values(shared, found, Path(bag).name), against, report(shared, found, str(bag)))
 
 

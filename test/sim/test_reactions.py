@@ -142,7 +142,7 @@ def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[Anal
     one, other = press(summary, "press across"), press(summary, "press across by a task")
     assert one.hold.commanded == other.hold.commanded == pytest.approx(8.0)
     for held in (one, other):
-        for accuracy in (held.measured_accuracy, held.true_accuracy, held.estimated_accuracy):
+        for accuracy in held.accuracy.values():
             assert accuracy.bias == pytest.approx(0.0, abs=1.2)
     assert {"press across by a task: ripple of the true force"} <= {
         finding.name for section in analysis.sections for finding in section.findings
@@ -158,7 +158,7 @@ def test_the_true_force_along_an_axis_of_the_base_is_that_of_the_arm_on_the_obje
     stamps, columns = objects.row_stamp_ns, objects.columns
     late = (stamps >= held.hold.end - 0.4 * (held.hold.end - held.hold.begin)) & (stamps < held.hold.end)
     expected = -float(columns["arm_force_x"][late & (columns["object"] == 0)].mean())
-    assert held.hold.commanded + held.true_accuracy.bias == pytest.approx(expected, rel=1e-3)
+    assert held.hold.commanded + held.accuracy["true"].bias == pytest.approx(expected, rel=1e-3)
 
 
 def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:

@@ -110,7 +110,7 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
 
 def _accuracy(one: HeldForce) -> ForceAccuracy:
     """Of the true force, or of the measured one if the true one was not recorded."""
-    return one.true_accuracy if len(one.true) else one.measured_accuracy
+    return one.accuracy["true" if len(one.true) else "measured"]
 
 
 def _press_sentence(one: HeldForce) -> str:
@@ -155,11 +155,7 @@ def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
     found += [Finding(f"{name}: refused for", "s", seconds)] if seconds else []
     if one.hold.is_refused:
         return found
-    for whose, accuracy in (
-        ("true", one.true_accuracy),
-        ("measured", one.measured_accuracy),
-        ("estimated", one.estimated_accuracy),
-    ):
+    for whose, accuracy in one.accuracy.items():
         error = 100.0 * accuracy.bias / one.hold.commanded
         found += [
             Finding(f"{name}: {whose} force", "N", one.hold.commanded + accuracy.bias, note=STEADY_PART),

@@ -1,7 +1,7 @@
 """Each commanded force: how it was reached and held, and what theory predicts for it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_sim.recorded_run import RecordedRun
 from wam_theory.verdicts import Verdict
 
-UNMEASURED = force_accuracy(math.nan, np.empty(0))
+UNMEASURED = dict.fromkeys(("true", "measured", "estimated"), force_accuracy(math.nan, np.empty(0)))
 
 
 class HeldForce(NamedTuple):
@@ -41,7 +41,7 @@ class HeldForce(NamedTuple):
         not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
     before : force of the contact in which the hold began and of which the loop had no measurement yet, N, as where no
         force was commanded until then; 0 where there is none.  Rise and overshoot are those of the measurement.
-    measured_accuracy, true_accuracy, estimated_accuracy : in the steady part.
+    accuracy : in the steady part, of the force that is 'true', 'measured' or 'estimated'.
     cycle : apart from the dither, of the true force in its last 70 %, else of the measured one.
     cover, position : of the contact, by the simulator, else estimated, else as configured in the force loop; m.
     swinging : of the force, of a motor or joint where neither the measured nor the true one was recorded; None without.
@@ -55,9 +55,7 @@ class HeldForce(NamedTuple):
     response: StepResponse | None = None
     touched: float = math.nan
     before: float = 0.0
-    measured_accuracy: ForceAccuracy = UNMEASURED
-    true_accuracy: ForceAccuracy = UNMEASURED
-    estimated_accuracy: ForceAccuracy = UNMEASURED
+    accuracy: Mapping[str, ForceAccuracy] = UNMEASURED
     cycle: LimitCycle = NO_CYCLE
     cover: str = ""
     position: float = math.nan
@@ -71,38 +69,30 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
     true, estimated = (traces.along(signal, -1.0)[rows] for signal in (traces.true, traces.estimated))
     duration = (hold.end - hold.begin) / 1e9
-    late, late_true = time >= (1.0 - HOLD.steady) * duration, time_true >= (1.0 - HOLD.steady) * duration
-    estimated_accuracy = _accuracy(hold, estimated[late_true])
-    cover, position = _touched(traces, parameters, hold)
+    signals = {"true": (time_true, true), "measured": (time, measured), "estimated": (time_true, estimated)}
     if not np.any(np.isfinite(true)):
-        time_true, true, late_true = np.empty(0), np.empty(0), np.empty(0, bool)
+        time_true, true = np.empty(0), np.empty(0)
+    cover, position = _touched(traces, parameters, hold)
     held = HeldForce(hold, time, measured, time_true, true, cover=cover, position=position)
     if hold.is_refused:
         return held
-    swings, swings_true = time >= (1.0 - CYCLE.late_part) * duration, time_true >= (1.0 - CYCLE.late_part) * duration
     touched = _touch_down(traces, parameters, hold)
     response = _response(hold, time, measured, HOLD.steady * duration)
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
+    steady, late = ((1.0 - part) * duration for part in (HOLD.steady, CYCLE.late_part))
+    accuracy = {name: force_accuracy(hold.commanded, force[at >= steady]) for name, (at, force) in signals.items()}
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
+    cycles = (_cycle(at[at >= late], force[at >= late], dither) for at, force in ((time_true, true), (time, measured)))
     return held._replace(
         response=response,
         touched=touched,
         before=_before(traces, hold, measured),
-        measured_accuracy=_accuracy(hold, measured[late]),
-        true_accuracy=_accuracy(hold, true[late_true]),
-        estimated_accuracy=estimated_accuracy,
-        cycle=_cycle(time_true[swings_true], true[swings_true], dither)
-        or _cycle(time[swings], measured[swings], dither)
-        or NO_CYCLE,
+        accuracy=UNMEASURED if hold.is_short else accuracy,  # a short one has no steady part
+        cycle=next(filter(None, cycles), NO_CYCLE),
         swinging=swinging(run, hold, time, measured) if len(measured) else swinging(run, hold, time_true, true),
     )
-
-
-def _accuracy(hold: Hold, force: Numbers) -> ForceAccuracy:
-    """Of the force in the steady part, which a short hold lacks."""
-    return UNMEASURED if hold.is_short else force_accuracy(hold.commanded, force)
 
 
 def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:

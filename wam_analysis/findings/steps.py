@@ -146,7 +146,7 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     done = [one for one in held if not one.hold.is_refused]
     if len(done) < len(held):
         return VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} refused")
-    errors = [100.0 * one.true_accuracy.smallest / one.hold.commanded for one in done] + [math.nan] * brief
+    errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
     answer = _answer(question, errors, HOLD.force_tolerance, "{:.1f} %")
     short = brief + sum(one.hold.is_short for one in done)
     return answer._replace(remark=f"{short} of {len(held) + brief} forces lasted less than {STEADY:g} s" * bool(short))

@@ -4,7 +4,7 @@ Torques of the configured arm are compared with the recorded ones, as recorded a
 may have: the mistake that explains them much better is the likely cause.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from enum import StrEnum
 from itertools import combinations
 from typing import NamedTuple
@@ -21,14 +21,22 @@ from wam_description.arm import Shared
 
 
 class Mistake(StrEnum):
-    """What is wrong with a recording."""
+    """What is wrong with a recording, in words."""
 
-    SCALED = "scaled"  # all torques are larger or smaller than those of the configured arm
-    SCALED_MOTOR = "scaled_motor"  # those of one motor are, or have the other sign
-    SWAPPED = "swapped"  # two motors have each other's name
-    UNEXPLAINED = "unexplained"  # the torques of a motor are not those of any arm: something touches it
-    WEIGHT = "weight"  # the links seem to weigh much more or less than configured
-    NO_FRICTION = "no_friction"  # friction of a shaft is identified as none
+    # all torques are larger or smaller than those of the configured arm
+    SCALED = "all torques are {size:.2g} times those of the configuration: amperes, the other sign, or a load?"
+    # those of one motor are, or have the other sign
+    SCALED_MOTOR = (
+        "the torques of {about} are {size:.2g} times those of the configuration: sign, unit or torque constant?"
+    )
+    SWAPPED = "the torques fit if the names of the motors {about} are exchanged"
+    # the torques of a motor are not those of any arm
+    UNEXPLAINED = "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm?"
+    WEIGHT = (
+        "the links weigh {size:.2g} times as much as configured: a payload that is not in arm.payload, or a long "
+        "contact?"
+    )
+    NO_FRICTION = "no friction is left at {about}: did something push the arm along its motion?"
 
 
 class Contradiction(NamedTuple):
@@ -38,22 +46,9 @@ class Contradiction(NamedTuple):
     about: tuple[str, ...]
     size: float
 
-
-SENTENCES: Mapping[Mistake, str] = {
-    Mistake.SCALED: "all torques are {size:.2g} times those of the configuration: amperes, the other sign, or a load?",
-    Mistake.SCALED_MOTOR: "the torques of {about} are {size:.2g} times those of the configuration: sign, unit or "
-    "torque constant?",
-    Mistake.SWAPPED: "the torques fit if the names of the motors {about} are exchanged",
-    Mistake.UNEXPLAINED: "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm?",
-    Mistake.WEIGHT: "the links weigh {size:.2g} times as much as configured: a payload that is not in arm.payload, or "
-    "a long contact?",
-    Mistake.NO_FRICTION: "no friction is left at {about}: did something push the arm along its motion?",
-}
-
-
-def sentence(found: Contradiction) -> str:
-    """The contradiction and its likely cause in words."""
-    return SENTENCES[found.mistake].format(about=" and ".join(found.about), size=found.size)
+    def __str__(self) -> str:
+        """The contradiction and its likely cause in words."""
+        return self.mistake.format(about=" and ".join(self.about), size=self.size)
 
 
 def contradictions(shared: Shared, motion: MotionSamples, found: Identification) -> list[Contradiction]:

@@ -88,23 +88,15 @@ def turning_points(value: Numbers, least: float) -> Rows:
     least : a return by less is no turn.
     """
     found: list[int] = []
-    low = high = row = 0
-    way = 0
+    low = high = way = 0
     samples = value.tolist()
     for k, sample in enumerate(samples):
-        if way <= 0 and sample < samples[low]:
-            low = k
-        if way >= 0 and sample > samples[high]:
-            high = k
-        row = high if way > 0 else low
-        if way > 0 and sample < samples[row] - least:
-            found.append(row)
+        low = k if sample < samples[low] else low
+        high = k if sample > samples[high] else high
+        if way >= 0 and sample < samples[high] - least:
+            found += [high][:way]  # where it was before the first turn is not known
             way, low = -1, k
-        elif way < 0 and sample > samples[row] + least:
-            found.append(row)
+        elif way <= 0 and sample > samples[low] + least:
+            found += [low][:-way]
             way, high = 1, k
-        elif way == 0 and sample > samples[low] + least:
-            way, high = 1, k
-        elif way == 0 and sample < samples[high] - least:
-            way, low = -1, k
     return np.array(found, dtype=np.int64)

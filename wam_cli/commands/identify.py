@@ -10,7 +10,7 @@ from pathlib import Path
 
 import yaml
 
-from wam_analysis.identification.contradictions import contradictions, sentence
+from wam_analysis.identification.contradictions import contradictions
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.motion import LOADS, loaded, recorded_motion
 from wam_analysis.identification.overlay import HEADING as MODEL_HEADING
@@ -88,7 +88,7 @@ def run(given: argparse.Namespace) -> int:
     _refuse_other_arm(run_in_bag, shared)
     motion = recorded_motion(run_in_bag, shared.arm)
     found = identify(shared, motion)
-    against = [sentence(one) for one in contradictions(shared, motion, found)]
+    against = list(map(str, contradictions(shared, motion, found)))
     values = model_values(shared, found, bag.name) | estimator_values(configuration)
     impossible = impossibility(configuration, values, str(bag))
     if impossible:
