@@ -338,19 +338,24 @@ def test_a_posture_is_reached_that_the_arm_comes_to_at_the_end_of_its_step_or_so
     assert verdict(AnalysedRecording(bag)).startswith(f"posture within 0.02 rad: {answer}")
 
 
-@pytest.mark.parametrize(("declared", "is_contradicted"), [(0.20, False), (0.15, True)])  # 27 +- 3 cm is estimated
-def test_a_declared_position_is_shown_beside_the_estimated_one_which_may_contradict_it(declared, is_contradicted):
-    bag = with_limits(Played())
+@pytest.mark.parametrize(
+    ("lacks", "declared", "said"),
+    [("", 0.23, ""), ("", 0.2, "true position 25"), ("sim/contact/point", 0.2, ""),
+     ("sim/contact/point", 0.15, "estimated position 27 +- 3")],
+)  # fmt: skip
+def test_a_declared_position_is_in_the_table_and_a_defect_where_it_is_not_the_true_or_the_estimated_one(
+    lacks, declared, said
+):
+    recording = Played()
+    recording.without = (lacks,)
+    bag = with_limits(recording)
     command = bag.topics["/wam/force_command"]
-    torque = np.column_stack([0.0 * STAMPS, -declared * command.force[:, 2], declared * command.force[:, 1]])
-    found = section_of(
-        bag._replace(topics={**bag.topics, "/wam/force_command": command._replace(torque=torque)}), "contact"
-    )
-    numbers = {one.name: one.measured for one in found.findings}
-    assert numbers["3 outer_link: declared position"] == pytest.approx(100.0 * declared)
-    assert math.isnan(numbers["1 outer_link: declared position"])
-    said = "3 outer_link: its position is declared at 15 cm, but estimated at 27 +- 3 cm."
-    assert (said in found.wrong) == is_contradicted
+    command.torque[:, 1:] = declared * np.column_stack([-command.force[:, 2], command.force[:, 1]])
+    found = section_of(bag, "contact")
+    numbers = [one.measured for one in found.findings if one.quantity == "declared position"]
+    assert numbers[:3] == pytest.approx([math.nan, math.nan, 100.0 * declared], nan_ok=True)
+    stated = [f"3 outer_link: declared position {100.0 * declared:g} cm, {said} cm."] * bool(said)
+    assert [one for one in found.wrong if one.startswith("3 outer_link: declared")] == stated
 
 
 def nothing_but(true: tuple[float, float, str, float], estimated: tuple[float, float, str, float]) -> Played:
@@ -445,22 +450,18 @@ def test_without_truth_the_estimate_shows_what_was_too_hard():
     assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
 
 
-def test_a_contact_in_a_task_is_not_unplanned():
+def test_a_push_a_commanded_force_or_a_contact_in_a_task_is_not_unplanned():
     recording = Played()
+    recording.set(recording.push, 0.5, 1.5, "outer_link", (0.0, 120.0, 0.0))
+    recording.set(recording.true, 0.5, 1.52, "outer_link", (0.0, 120.0, 0.0), 0.28)  # it ends later than its command
+    recording.set(recording.true, 5.0, 5.5, "outer_link", (0.0, 120.0, 0.0), 0.25)
+    assert AnalysedRecording(with_limits(recording)).unplanned.hard == ()
     recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 157.0, 0.0), 0.25)
     bag = with_limits(recording)
     axis = {"kind": np.zeros(len(STAMPS))}
     task = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(len(STAMPS)), axis)
     assert AnalysedRecording(bag._replace(topics={**bag.topics, "/wam/task_command": task})).unplanned.hard == ()
     assert len(AnalysedRecording(bag._replace(topics={**bag.topics, "/wam/task_command": NO_TASK})).unplanned.hard) == 1
-
-
-def test_a_push_or_a_commanded_force_is_not_unplanned():
-    recording = Played()
-    recording.set(recording.push, 0.5, 1.5, "outer_link", (0.0, 120.0, 0.0))
-    recording.set(recording.true, 0.5, 1.52, "outer_link", (0.0, 120.0, 0.0), 0.28)  # it ends later than its command
-    recording.set(recording.true, 5.0, 5.5, "outer_link", (0.0, 120.0, 0.0), 0.25)
-    assert AnalysedRecording(with_limits(recording)).unplanned.hard == ()
 
 
 @pytest.mark.slow

@@ -102,14 +102,16 @@ def declared_position(recording: AnalysedRecording, contact: ListedContact) -> f
 
 
 def _contradicted(recording: AnalysedRecording) -> Iterator[str]:
-    """Declared positions of which the estimated ones are further away than both standard deviations explain."""
+    """Declared positions from which the true ones, else the estimated ones, are further away than their sd explain."""
     loop = recording.parameters.force_loop
     for name, one in named_contacts(recording.contacts):
-        declared, found = declared_position(recording, one), one.estimate
-        sd = math.hypot(found.position_sd, loop.contact_position_sd if loop else 0.0)
-        if abs(found.position - declared) > SHAFT.sigmas * sd:
-            at = f"{100.0 * found.position:.3g} +- {100.0 * found.position_sd:.2g} cm"
-            yield f"{name}: its position is declared at {100.0 * declared:.3g} cm, but estimated at {at}."
+        declared, cm = declared_position(recording, one), 100.0
+        place, sd, how = one.estimate.position, one.estimate.position_sd, "estimated"
+        if one.true == one.estimate.link and math.isfinite(one.true_position):
+            place, sd, how = one.true_position, 0.0, "true"
+        if abs(place - declared) > SHAFT.sigmas * math.hypot(sd, loop.contact_position_sd if loop else 0.0):
+            at = f"{cm * place:.3g} +- {cm * sd:.2g}" if sd else f"{cm * place:.3g}"
+            yield f"{name}: declared position {cm * declared:.3g} cm, {how} position {at} cm."
 
 
 def _numbers(name: str, contact: ListedContact, period: float, declared: float) -> Iterator[Finding]:
