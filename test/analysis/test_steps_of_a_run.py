@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 from wam_analysis import arm_picture
 from wam_analysis.contact_list import CUT, NOT_PLACED, listed_contacts
 from wam_analysis.findings.analysis import SECTIONS_OF_STEPS, TOPICS_READ, Analysis, analyse_bag, analyse_steps
-from wam_analysis.findings.contact import BLIND, contact_numbers
+from wam_analysis.findings.contact import BLIND
 from wam_analysis.findings.finding import Section
 from wam_analysis.findings.force import press_findings
 from wam_analysis.findings.held_force import Theory
@@ -537,7 +537,7 @@ def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_th
     assert [one.step for one in pressed] == ["press 8 N", "press 4 N", "lift"]
     assert [one.estimate.force for one in pressed] == pytest.approx([7.84, 3.92, 3.0])
     shown = told(recording.bag())
-    numbers = {one.name: one.measured for one in contact_numbers(recording.summary())}
+    numbers = {one.name: one.measured for one in section_of(recording.bag(), "contact").findings}
     names = ("from", "probability of the link", "position along the link", "force")
     assert [numbers[f"1 outer_link: {name}"] for name in names] == pytest.approx([0.72, 97.0, 30.0, 11.0])
     assert "30 +- 3" in shown

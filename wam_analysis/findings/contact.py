@@ -1,7 +1,7 @@
 """Section about the estimated contacts, compared with the true ones."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from wam_analysis.contact_list import NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, Li
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT, TOUCH
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 
 BLIND = "Contacts while the brakes hold are not compared: without joint sensors they are not detected."
 
@@ -20,13 +21,21 @@ def contact_section(recording: AnalysedRecording) -> Section:
     lacking = recording.run.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences, *_contradicted(recording)]
+    wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
     shows: list[str] = []
     named = [f"{number} {one.step}" for number, one in enumerate(recording.contacts, 1) if one.step]
     sentences += [f"Contacts by number and step: {', '.join(named)}."] if named else []
-    sentences += contact_doubts(recording)
+    for number, contact in enumerate(recording.contacts, 1):
+        name = f"{number} {contact.estimate.link}{' false' * contact.is_false}"
+        declared = declared_position(recording, contact)
+        findings += _numbers(name, contact, traces.period, declared)
+        sentences += _doubts(name, contact)
+        wrong += _contradicted(name, contact, declared, recording.parameters.force_loop)
+    if any(math.isnan(contact.estimate.probability) for contact in recording.contacts):
+        sentences.append(NOT_CERTAIN)
+    if not all(contact.estimate.is_placed for contact in recording.contacts):
+        sentences.append(f"Positions of contacts: {NOT_PLACED}.")
     sentences += [BLIND] * bool(np.any(recording.blind & traces.true.acts))
-    findings += contact_numbers(recording)
     sentences += wrong
     true, sensed = traces.true, traces.estimated
     known = traces.is_compared
@@ -68,28 +77,6 @@ def contact_section(recording: AnalysedRecording) -> Section:
     return Section("contact", "Contact", sentences, findings, lacking, shows, wrong)
 
 
-def contact_numbers(recording: AnalysedRecording) -> Iterator[Finding]:
-    """Every estimated contact in numbers."""
-    for name, contact in named_contacts(recording.contacts):
-        yield from _numbers(name, contact, recording.traces.period, declared_position(recording, contact))
-
-
-def contact_doubts(recording: AnalysedRecording) -> Iterator[str]:
-    """What is not to be trusted of the estimated contacts."""
-    for name, contact in named_contacts(recording.contacts):
-        yield from _doubts(name, contact)
-    if any(math.isnan(contact.estimate.probability) for contact in recording.contacts):
-        yield NOT_CERTAIN
-    if not all(contact.estimate.is_placed for contact in recording.contacts):
-        yield f"Positions of contacts: {NOT_PLACED}."
-
-
-def named_contacts(contacts: Sequence[ListedContact]) -> Iterator[tuple[str, ListedContact]]:
-    """Each estimated contact with its number and link; one where nothing was touched is marked as false."""
-    for number, one in enumerate(contacts, 1):
-        yield f"{number} {one.estimate.link}{' false' * one.is_false}", one
-
-
 def declared_position(recording: AnalysedRecording, contact: ListedContact) -> float:
     """Where the command or the parameters pin the force of a contact, m along its link; NaN where they do not."""
     link, zero, loop = contact.estimate.link, recording.traces.zero, recording.parameters.force_loop
@@ -101,17 +88,16 @@ def declared_position(recording: AnalysedRecording, contact: ListedContact) -> f
     return math.nan
 
 
-def _contradicted(recording: AnalysedRecording) -> Iterator[str]:
-    """Declared positions from which the true ones, else the estimated ones, are further away than their sd explain."""
-    loop = recording.parameters.force_loop
-    for name, one in named_contacts(recording.contacts):
-        declared, cm = declared_position(recording, one), 100.0
-        place, sd, how = one.estimate.position, one.estimate.position_sd, "estimated"
-        if one.true == one.estimate.link and math.isfinite(one.true_position):
-            place, sd, how = one.true_position, 0.0, "true"
-        if abs(place - declared) > SHAFT.sigmas * math.hypot(sd, loop.contact_position_sd if loop else 0.0):
-            at = f"{cm * place:.3g} +- {cm * sd:.2g}" if sd else f"{cm * place:.3g}"
-            yield f"{name}: declared position {cm * declared:.3g} cm, {how} position {at} cm."
+def _contradicted(
+    name: str, contact: ListedContact, declared: float, loop: ForceLoopParameters | None
+) -> Iterator[str]:
+    """That the true position, else the estimated one, is further from the declared one than their sd explain."""
+    cm, place, sd, how = 100.0, contact.estimate.position, contact.estimate.position_sd, "estimated"
+    if contact.true == contact.estimate.link and math.isfinite(contact.true_position):
+        place, sd, how = contact.true_position, 0.0, "true"
+    if abs(place - declared) > SHAFT.sigmas * math.hypot(sd, loop.contact_position_sd if loop else 0.0):
+        at = f"{cm * place:.3g} +- {cm * sd:.2g}" if sd else f"{cm * place:.3g}"
+        yield f"{name}: declared position {cm * declared:.3g} cm, {how} position {at} cm."
 
 
 def _numbers(name: str, contact: ListedContact, period: float, declared: float) -> Iterator[Finding]:

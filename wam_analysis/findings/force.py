@@ -137,14 +137,11 @@ def _impact(one: HeldForce) -> str:
     """Why rise and overshoot of a press are not those of the control, '' where they are."""
     if one.before:
         return f"it began while {shown(one.before, 'N')} acted already"
-    return _touched(one) if math.isfinite(one.touched) else ""
-
-
-def _touched(one: HeldForce) -> str:
-    """When a press touched down, and how hard."""
+    if math.isnan(one.touched):
+        return ""
     peak = float(np.nanmax(one.true if len(one.true) else one.measured))
-    when = f"{shown(abs(one.touched), 's')} {'after' if one.touched > 0.0 else 'before'} it" if one.touched else "as it"
-    return f"the surface was touched {when} began, and the force peaked at {shown(peak, 'N')}"
+    when = f"{shown(abs(one.touched), 's')} {'after' if one.touched > 0.0 else 'before'} it began"
+    return f"the surface was touched {when}, and the force peaked at {shown(peak, 'N')}"
 
 
 def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
@@ -168,17 +165,14 @@ def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
     else:
         rise, note = math.nan, ""
     if response is not None:
-        rose, late, over, why = response.rise, response.rise_error, 100.0 * response.overshoot, ""
-        if impact := _impact(one):
+        rose, late, over = response.rise, response.rise_error, 100.0 * response.overshoot
+        if _impact(one):
             rose = late = over = math.nan
-            why = f"not measured: {impact}"
         since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
-            Finding(
-                f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note))), late, is_ideal=True
-            ),
+            Finding(f"{name}: rise time 10-90 %", "s", rose, rise, note, late, is_ideal=True),
             Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
-            Finding(f"{name}: overshoot", "%", over, note=why),
+            Finding(f"{name}: overshoot", "%", over),
         ]
     return found
 
