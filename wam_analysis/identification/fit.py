@@ -37,8 +37,6 @@ class Identification(NamedTuple):
     residual, held_out, before : (n,), rms torque of each motor that the estimate, the estimate from the other parts of
         the motion, and the present model do not explain, N m.
     seconds : of the motion that was used, of each motor, (n,).
-    condition : of the identified combinations of parameters, scaled by the prior.
-    rank : number of those combinations.
     both_directions : (n,), parts of the motion in which each motor turns both ways.
     tracked : the covariance in the errors of the model that the contact estimator tracks.
     """
@@ -52,8 +50,6 @@ class Identification(NamedTuple):
     held_out: Numbers
     before: Numbers
     seconds: Numbers
-    condition: float
-    rank: int
     both_directions: Numbers
     tracked: TrackedErrors
 
@@ -294,9 +290,6 @@ def _result(
     equations, information = best.equations, best.normal.information.sum(0)
     before = equations.torque - equations.columns @ sought.present
     left = equations.torque - equations.columns @ best.values
-    scaled = information * np.outer(sought.prior_sd, sought.prior_sd)
-    strength = np.linalg.eigvalsh(scaled)
-    shown = strength[strength >= IDENTIFY.identified**-2]
     step = float(np.median(np.diff(equations.time)))
     moves = equations.columns[:, :, sought.places("motors.viscous")].diagonal(axis1=1, axis2=2)
     both = [
@@ -316,8 +309,6 @@ def _result(
         best.held_out,
         _rms(before, equations.is_used),
         equations.is_used.sum(0) * step,
-        float(np.sqrt(shown[-1] / shown[0])) if len(shown) else float("inf"),
-        len(shown),
         np.array(both),
         tracked,
     )

@@ -14,10 +14,11 @@ UNITS = {
     "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
     "moment": "kg m", "torque": "",
 }  # fmt: skip
-NOTES = """{rank} combinations of {count} parameters are identified; condition number {condition:.3g}.
-'In combination': identified only together with other parameters.
-'{by_shape}': static friction is where the fitted friction curve ends at rest, with the error of that curve. Stiction
-that acts only below {slowest:g} rad/s of a motor is not in it: see `wam analyse` for the torques of breakaway.
+STATIC = "motors.static_"
+BY_SHAPE = "by the curve"
+NOTES = f"""'In combination': identified only together with other parameters.
+'{BY_SHAPE}': static friction is where the fitted friction curve ends at rest, with the error of that curve. Stiction
+that acts only below {IDENTIFY.slowest_motor:g} rad/s of a motor is not in it; `wam analyse` shows breakaway torques.
 The inertia of a rotor may err by a quarter, up to twice its standard error, in either direction: see docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: it gives the same torques as friction that differs between the
@@ -25,10 +26,6 @@ directions, in motion, at rest and with a dither. The table shows the offset tha
 The model has the sum of friction and offset, in coulomb_positive and coulomb_negative.
 'not in the covariance': standard deviation of each motor's torque that follows from errors of parameters that the
 covariance for the contact estimator cannot express."""
-
-
-STATIC = "motors.static_"
-BY_SHAPE = "by the curve"
 
 
 def report(shared: Shared, found: Identification, label: str) -> str:
@@ -70,14 +67,8 @@ def report(shared: Shared, found: Identification, label: str) -> str:
             for i, name in enumerate(shared.arm.motors.names)
         ],
     )
-    lines += ["", _notes(found, len(result.names))]
+    lines += ["", NOTES]
     return "\n".join([*lines, *(f"warning: {text}" for text in warnings(shared, found)), ""])
-
-
-def _notes(found: Identification, count: int) -> str:
-    return NOTES.format(
-        rank=found.rank, count=count, condition=found.condition, by_shape=BY_SHAPE, slowest=IDENTIFY.slowest_motor
-    )
 
 
 def warnings(shared: Shared, found: Identification) -> Iterator[str]:
