@@ -65,34 +65,31 @@ class UnplannedContacts(NamedTuple):
 
 
 def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> UnplannedContacts:
-    """Those of all the time that was recorded; with the true force where it is known in a step, else the estimated.
+    """Those of all the time that was recorded; with the true force where it is known, else the estimated one.
 
     Where no command comes, nothing is commanded; where the bag lacks messages of one, it is not known what was planned.
     """
-    found: list[HardContact] = []
-    unknown: list[str] = []
-    is_planned, allowed, lacking = _planned(run, traces), _allowed(run, traces), ", ".join(_lacking(run))
-    for name, begin, end in _parts(traces, steps):
-        rows = begin + np.flatnonzero(~is_planned[begin:end])
-        source, signal = "true", traces.true
-        if not np.any(signal.is_known[rows]):
-            source, signal = "estimated", traces.estimated
-        rows = rows[signal.acts[rows]]
-        if np.any(np.isnan(allowed[rows])):
-            unknown.append(f"{LIMIT} of the force loop was not recorded, or cannot be read")
-        rows = rows[signal.size[rows] > allowed[rows]]
-        if not len(rows):
-            continue
-        row = rows[np.argmax(signal.size[rows])]
-        hard = HardContact(
-            name, (int(traces.stamp[row]) - traces.zero) / 1e9, float(signal.size[row]), float(allowed[row]), source
-        )
-        if lacking:
-            unknown.append(
-                f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded ({lacking})"
-            )
-        else:
-            found.append(hard)
+    is_true, allowed, lacking = traces.true.is_known, _allowed(run, traces), ", ".join(_lacking(run))
+    size = np.where(is_true, traces.true.size, traces.estimated.size)
+    is_free = ~_planned(run, traces) & (size > 0.0)
+    unknown = [f"{LIMIT} of the force loop was not recorded, or cannot be read"] * bool(
+        np.any(np.isnan(allowed[is_free]))
+    )
+    names = ["", *(step.name for step in steps), ""]  # before the first and after the last
+    ends = [*(step.begin for step in steps), *(step.end for step in steps[-1:])]
+    number, is_hard = np.searchsorted(ends, traces.stamp, side="right"), is_free & (size > allowed)
+    found = []
+    for part in np.unique(number[is_hard]).tolist():
+        row = int(np.argmax(np.where(is_hard & (number == part), size, 0.0)))
+        seconds = (int(traces.stamp[row]) - traces.zero) / 1e9
+        source = "true" if is_true[row] else "estimated"
+        found.append(HardContact(names[part], seconds, float(size[row]), float(allowed[row]), source))
+    if lacking:
+        unknown += [
+            f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded ({lacking})"
+            for hard in found
+        ]
+        found = []
     return UnplannedContacts(tuple(found), "; ".join(dict.fromkeys(unknown)))
 
 
@@ -101,13 +98,6 @@ def _lacking(run: RecordedRun) -> list[str]:
     lost = run.bag.losses.topics
     named = {one: f"{run.namespace}/{one}" for one in (COMMANDS if run.is_simulated else COMMANDS[:2])}
     return [one for one, name in named.items() if name not in run.bag.topics or name in lost]
-
-
-def _parts(traces: Traces, steps: Sequence[RecordedStep]) -> list[tuple[str, int, int]]:
-    """Name and rows [begin, end) of the time before the steps, of each and of that after them."""
-    bounds = np.searchsorted(traces.stamp, [step.begin for step in steps] + [step.end for step in steps[-1:]]).tolist()
-    names = ["", *(step.name for step in steps), *[""][: len(steps)]]
-    return list(zip(names, [0, *bounds], [*bounds, len(traces.stamp)], strict=True))
 
 
 def _allowed(run: RecordedRun, traces: Traces) -> Numbers:

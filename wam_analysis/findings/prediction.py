@@ -174,16 +174,17 @@ def largest_force(arm: Arm, q: Sequence[float], cover: str, position: float, dir
     transmission = TransmissionMap.of(arm)
     motor = np.array(transmission.motor_torques(torque.tolist()))  # per newton
     carried = np.array(transmission.motor_torques(body.gravity_torque(q).tolist()))
-    cables = []
-    for one in arm.circuits:
-        taut, broken = 2.0 * (one.breaking_strength - one.pretension), one.breaking_strength
-        cables.append(one.radius * (taut if taut <= 2.0 * one.pretension else broken))
-    limits = {"peak torque": np.array(arm.motors.peak_torque), "cable": np.array(cables)}
     best = LargestForce(math.inf, "nothing")
-    for what, limit in limits.items():
-        left = np.maximum(limit - np.sign(motor) * carried, 0.0)
-        force = np.divide(left, np.abs(motor), out=np.full(len(motor), math.inf), where=np.abs(motor) > 1e-9)
-        i = int(np.argmin(force))
-        if force[i] < best.force:
-            best = LargestForce(float(force[i]), f"{what} of {arm.motors.names[i]}")
+    for i, name in enumerate(arm.motors.names):
+        if abs(motor[i]) < 1e-9:
+            continue
+        circuit = arm.circuits[i]
+        taut = 2.0 * (circuit.breaking_strength - circuit.pretension) * circuit.radius
+        cable = (
+            taut if taut <= 2.0 * circuit.pretension * circuit.radius else circuit.breaking_strength * circuit.radius
+        )
+        for limit, what in ((arm.motors.peak_torque[i], f"peak torque of {name}"), (cable, f"cable of {name}")):
+            room = limit - math.copysign(1.0, motor[i]) * carried[i]
+            if room / abs(motor[i]) < best.force:
+                best = LargestForce(max(room, 0.0) / abs(float(motor[i])), what)
     return best
