@@ -82,51 +82,38 @@ def node_at(
     square = float(along @ along)
     if square <= 1e-6:
         return None
-    ratio = TransmissionMap.of(arm).motor_from_joint
-    stiffness = ratio.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ ratio
+    at_joints = TransmissionMap.of(arm).at_joints
+    stiffness, cables = (at_joints([getattr(one, name) for one in arm.circuits]) for name in ("stiffness", "damping"))
     inertia = body.mass_matrix(q) + np.diag(arm.joints.armature)
-    gives = float(along @ np.linalg.solve(stiffness, along))
+    gives, servo = float(along @ np.linalg.solve(stiffness, along)), recorded.servo
+    yields = servo is not None and all(gain > 0.0 for gain in servo.integral_gain)
+    driven = float(along @ np.linalg.solve(at_joints(servo.integral_gain), along)) if servo and yields else 0.0
     moves = along / square
-    cables = np.array([circuit.damping for circuit in arm.circuits])
-    surface = _surface(recorded, arm, cover, position)
+    surface, damping = _surface(recorded, arm, cover, position)
     return Node(
         transmission_stiffness=1.0 / gives,
-        driven_stiffness=1.0 / (gives + _servo_compliance(recorded, ratio, along)),
-        contact_stiffness=surface.stiffness,
+        driven_stiffness=1.0 / (gives + driven),
+        contact_stiffness=surface,
         inertia=1.0 / float(along @ np.linalg.solve(inertia, along)),
-        damping=float(np.array(arm.joints.viscous_friction) @ moves**2 + cables @ (ratio @ moves) ** 2)
-        + surface.damping,
+        damping=float(moves @ (np.diag(arm.joints.viscous_friction) + cables) @ moves) + damping,
         static_friction=float(np.array(arm.joints.static_friction) @ np.abs(moves)),
         dynamic_friction=float(np.array(arm.joints.dynamic_friction) @ np.abs(moves)),
         joint_per_metre=moves,
     )
 
 
-def _servo_compliance(recorded: PredictionParameters, ratio: Numbers, along: Numbers) -> float:
-    """Compliance of the velocity loops along the force, m/N; 0 where they are not known."""
-    servo = recorded.servo
-    if servo is None or not all(gain > 0.0 for gain in servo.integral_gain):
-        return 0.0
-    return float(along @ np.linalg.solve(ratio.T @ np.diag(servo.integral_gain) @ ratio, along))
-
-
-class _Surface(NamedTuple):
-    stiffness: float
-    damping: float
-
-
-def _surface(recorded: PredictionParameters, arm: Arm, cover: str, position: float) -> _Surface:
+def _surface(recorded: PredictionParameters, arm: Arm, cover: str, position: float) -> tuple[float, float]:
     """Stiffness, N/m, and damping, N s/m: of the spring under the joint, else of the obstacles if all have the same."""
     link = arm.covers.links[arm.covers.names.index(cover)]
     joint = arm.joints.names[arm.links.names.index(link)]
     if recorded.world is None:
-        return _Surface(math.nan, 0.0)
+        return math.nan, 0.0
     springs, obstacles = recorded.world.springs, recorded.world.obstacles
     for name, stiffness, lever in zip(springs.joints, springs.stiffness, springs.lever, strict=True):
         if name == joint and stiffness > 0.0 and position > 0.0:
-            return _Surface(stiffness * (lever / position) ** 2, 0.0)
+            return stiffness * (lever / position) ** 2, 0.0
     found = set(zip(obstacles.stiffness, obstacles.damping, strict=True))
-    return _Surface(*found.pop()) if len(found) == 1 else _Surface(math.nan, 0.0)
+    return found.pop() if len(found) == 1 else (math.nan, 0.0)
 
 
 def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
