@@ -469,6 +469,7 @@ TABLES = {
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "dates": Written(times=date),
     "dates of a zone": Written(times=lambda time: f"{date(time)}+02:00"),
+    "dates as Python logs them": Written(times=lambda time: date(time).replace("T", " ").replace(".", ",")),
     "a row of units": Written(units=OTHER_UNITS, below="ms,deg,deg/s,mA\n"),
     "some rows without a time": Written(times=lambda time: "" if round(100.0 * time) % 1000 == 7 else time),
     "a comment above": Written(comment="# recorded by hand\n"),

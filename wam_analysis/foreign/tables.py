@@ -282,6 +282,6 @@ def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     if np.any(known):
         return nanoseconds(label, numbers[known], given), known
     try:
-        return _times(label, np.array([ZONE.sub("", str(one)) for one in column], "M8[ns]"), given)
+        return _times(label, np.array([ZONE.sub("", str(one)).replace(",", ".") for one in column], "M8[ns]"), given)
     except ValueError:
         raise BagError(f"{label} has no times") from None
