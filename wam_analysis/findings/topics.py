@@ -90,7 +90,6 @@ def _lacks_velocity(one: Source) -> bool:
 
 
 DONE_TO = {
-    Treatment.COARSE: "{number} of {of} stamps repeat the one before; reception times are used",
     Treatment.ROUNDED: "the stamps are rounded to {size}; reception times are used",
     Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are placed evenly between them",
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",

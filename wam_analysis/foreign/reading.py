@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wam_analysis.foreign.clocks import BILLION, nanoseconds
-from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import NOT_READ, Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
@@ -16,16 +16,17 @@ from wam_bag.columns import UNNAMED, joint_columns
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 INTERFACES = "control_msgs/msg/DynamicJointState"
-FIELDS = {  # of the types that are known, by quantity
-    JOINTS: {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"},
-    WRENCH: {"force": "wrench.force", "torque": "wrench.torque"},
-    INTERFACES: {"name": "joint_names", **{q: f"interface_values.{q}" for q in IN_JOINTS}},
-}
-POINTS = {
-    "": ("feedback", "actual"),
-    " command": ("reference", "desired"),
-}  # of a controller: suffix of the topic, names
+POINTS = {"feedback": "", "actual": "", "reference": " command", "desired": " command"}  # of controllers, new and old
 OF_POINT = {"position": "positions", "velocity": "velocities", "effort": "effort"}
+FIELDS = {  # of the types that are known: suffix of the topic, and fields by quantity
+    JOINTS: [("", {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"})],
+    WRENCH: [("", {"force": "wrench.force", "torque": "wrench.torque"})],
+    INTERFACES: [("", {"name": "joint_names", **{q: f"interface_values.{q}" for q in IN_JOINTS}})],
+    CONTROLLER: [
+        (suffix, {"name": "joint_names", **{q: f"{point}.{own}" for q, own in OF_POINT.items()}})
+        for point, suffix in POINTS.items()
+    ],
+}
 COMMAND = "command"
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
 TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
@@ -71,7 +72,9 @@ def _analysed(bag: Bag, given: TopicMap) -> Bag:
     types = dict(bag.types)
     for name, columns in bag.topics.items():
         for part, found in _mapped(name, bag.types[name], columns, given):
-            topics[part] = found
+            if part in topics and not any(getattr(found, q).size for q in IN_JOINTS):
+                continue  # names that a controller of this version leaves empty
+            topics[part] = _scaled(found, given)
             is_command = part in given.commands or (bag.types[name] == CONTROLLER and part != name)
             types[part] = COMMAND if is_command else bag.types[name]
     return checked(bag._replace(topics=topics, types=types), given)
@@ -88,19 +91,21 @@ def checked(bag: Bag, given: TopicMap) -> Bag:
 # to columns
 
 
+def _scaled(columns: Any, given: TopicMap) -> Any:
+    """The columns in the units that are shown, with the given names of joints that have none."""
+    scaled = {q: given.scaled(q)[0] * getattr(columns, q) for q in QUANTITIES if hasattr(columns, q)}
+    if UNNAMED in getattr(columns, "irregular", ()) and len(given.joints) == len(columns.names):
+        irregular = {what: n for what, n in columns.irregular.items() if what != UNNAMED}
+        columns = columns._replace(names=given.joints, irregular=irregular)
+    return columns._replace(**scaled)
+
+
 def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tuple[str, JointColumns | WrenchColumns]]:
-    """The columns of a topic by name, scaled; those of a controller's state are two: feedback and reference."""
-    if isinstance(columns, JointColumns):
-        names, irregular = columns.names, dict(columns.irregular)
-        if len(given.joints) == len(names) and irregular.pop(UNNAMED, 0):
-            names = given.joints
-        scaled = {q: given.scaled(q)[0] * getattr(columns, q) for q in IN_JOINTS}
-        yield topic, columns._replace(names=names, irregular=irregular, **scaled)
-    elif isinstance(columns, WrenchColumns):
-        force, torque = (given.scaled(q)[0] for q in ("force", "torque"))
-        yield topic, columns._replace(force=force * columns.force, torque=torque * columns.torque)
+    """The columns of a topic by name; those of a controller's state are two: feedback and reference."""
+    if isinstance(columns, (JointColumns, WrenchColumns)):
+        yield topic, columns
     elif columns.messages:
-        for suffix, fields in _fields(kind, columns, given).items():
+        for suffix, fields in _fields(kind, columns.messages[0], given):
             has_joints, has_wrench = any(q in fields for q in IN_JOINTS), "force" in fields or "torque" in fields
             if not has_joints and not has_wrench:
                 raise ValueError(f"{topic} is of type {kind}; name its fields, for example --map position=FIELD")
@@ -110,24 +115,18 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
                 yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, fields, given)
 
 
-def _fields(kind: str, columns: Messages, given: TopicMap) -> dict[str, dict[str, str]]:
-    """Where messages have which quantity, by suffix of the topic: what is given, else what is known of their type."""
-    mapped = {q: path for q, path in given.fields.items() if all(_has(columns.messages[0], p) for p in path.split(","))}
-    if kind == CONTROLLER and not mapped:
-        found = {}
-        for suffix, names in POINTS.items():
-            part = max(names, key=lambda name: _filled(columns, f"{name}.positions"))
-            found[suffix] = {"name": "joint_names", **{q: f"{part}.{own}" for q, own in OF_POINT.items()}}
-        return found
-    own = FIELDS.get(kind)
-    if own is None:
-        return {"": dict(given.fields)}
-    return {"": own | {q: path for q, path in mapped.items() if q in own or q == "stamp"}}
-
-
-def _filled(columns: Messages, path: str) -> int:
-    """How many messages have values at a path; -1 if their type does not have it."""
-    return sum(len(_at("", one, path)) > 0 for one in columns.messages) if _has(columns.messages[0], path) else -1
+def _fields(kind: str, message: Any, given: TopicMap) -> Iterable[tuple[str, Mapping[str, str]]]:
+    """Suffixes of a topic, each with the fields by quantity: those that are given, else those of the type."""
+    known = [
+        (suffix, {q: path for q, path in fields.items() if _has(message, path)})
+        for suffix, fields in FIELDS.get(kind, ())
+    ]
+    own = [(suffix, fields) for suffix, fields in known if fields.keys() - {"name"}]
+    if not own:
+        return [("", given.fields)]
+    mapped = {q: path for q, path in given.fields.items() if all(_has(message, part) for part in path.split(","))}
+    (suffix, first), *_ = own
+    return [(suffix, first | {q: path for q, path in mapped.items() if q in (*first, "stamp")})] if mapped else own
 
 
 def _has(message: Any, path: str) -> bool:
@@ -203,17 +202,13 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
     times, frames = _times(topic, columns, fields, given), _frames(columns)
     alike: dict[Any, list[int]] = {}  # rows by frame, names and lengths of the fields
     for k, message in enumerate(columns.messages):
-        names = tuple(_at(topic, message, fields["name"])) if "name" in fields else ()
         widths = tuple(len(taken[q][k]) if q in taken else 0 for q in IN_JOINTS)
-        if not names and len(given.joints) == max(widths):
-            names = given.joints
+        fitting = given.joints if len(given.joints) == max(widths) else ()
+        names = tuple(_at(topic, message, fields["name"])) if "name" in fields else fitting
         alike.setdefault((frames[k], names, widths), []).append(k)
     groups = []
     for (frame, names, _), rows in alike.items():
-        values = [
-            given.scaled(q)[0] * np.array([taken[q][k] if q in taken else () for k in rows], np.float64)
-            for q in IN_JOINTS
-        ]
+        values = [np.array([taken[q][k] if q in taken else () for k in rows], np.float64) for q in IN_JOINTS]
         groups.append((np.array(rows), (times[rows], frame, names, values)))
     found = joint_columns(columns.log_time_ns, groups)
     return found if "name" in fields else found._replace(irregular={})
@@ -226,5 +221,5 @@ def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
         for k, row in enumerate(_numbers(topic, columns, fields[quantity]) if quantity in fields else ()):
             part = row[3:] if quantity == "torque" and len(row) == 6 else row[:3]
             values[k, : len(part)] = part
-        parts.append(given.scaled(quantity)[0] * values)
+        parts.append(values)
     return WrenchColumns(columns.log_time_ns, _times(topic, columns, fields, given), _frames(columns), *parts)

@@ -23,8 +23,7 @@ AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 class Treatment(StrEnum):
     """What was found in raw values, and done to them before the analysis."""
 
-    COARSE = "coarse stamps"  # times of reception were used
-    ROUNDED = "rounded stamps"  # likewise
+    ROUNDED = "rounded stamps"  # times of reception were used
     SPREAD = "coarse stamps, placed evenly"  # as are the times of reception: the messages were placed evenly
     TWICE = "messages that came twice"  # the second was left out
     WRAPPED = "wraps of the angle"  # were unwrapped
@@ -201,12 +200,10 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
     is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
-    if not (is_seldom or np.all(same)) and np.median(waits[same]) >= STREAM.paced * np.median(waits[~same]):
-        return _received(rows, stamps, received, Treated(Treatment.COARSE, "", number, of))
-    if is_seldom and of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps[~same]):
+    if of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps[~same] if is_seldom else steps):
         quantum = int(np.gcd.reduce(steps))
         if quantum > STREAM.irregular * np.median(steps[~same]):
-            return _received(rows, stamps, received, Treated(Treatment.ROUNDED, "", of, of, quantum / 1e9))
+            return _received(rows, stamps, received, quantum)
     if not number:
         return _Timed(rows, stamps / 1e9, ())
     if is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]:
@@ -297,12 +294,13 @@ def _parts(
     ]
 
 
-def _received(rows: Index, stamps: Times, received: Times, treated: Treated) -> _Timed:
-    """Messages at their times of reception, less what these are later than the stamps at least."""
+def _received(rows: Index, stamps: Times, received: Times, quantum: int) -> _Timed:
+    """Messages with stamps rounded to a quantum at their times of reception, less what these are later at least."""
     arrived = received[rows]
     order = np.argsort(arrived, kind="stable")
     times = arrived[order] - np.min(arrived - stamps)
     kept = np.concatenate([[True], np.diff(times) > 0])
+    treated = Treated(Treatment.ROUNDED, "", len(rows), len(rows), quantum / 1e9)
     return _Timed(rows[order][kept], times[kept] / 1e9, (treated,))
 
 
