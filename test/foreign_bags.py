@@ -87,19 +87,21 @@ def by_mcap_ros2(path: Path, sent: list[Sent]) -> Path:
     return file
 
 
-def by_json(path: Path, sent: list[Sent]) -> Path:
-    """One MCAP file with JSON, by the mcap library."""
+def by_json(path: Path, sent: list[Sent], kind: str = "robot.State") -> Path:
+    """One MCAP file with JSON, by the mcap library; a type of ROS has a header as rosbridge writes it."""
     file = path.with_suffix(".mcap")
     with file.open("wb") as stream:
         writer = McapWriter(stream)
         writer.start()
-        schema = writer.register_schema("robot.State", "jsonschema", b'{"type": "object"}')
+        schema = writer.register_schema(kind, "jsonschema", b'{"type": "object"}')
         channels: dict[str, int] = {}
         for one in in_order(sent):
             if one.topic not in channels:
                 channels[one.topic] = writer.register_channel(one.topic, "json", schema)
             fields = {q: np.asarray(v).tolist() for q, v in one.fields.items()}
-            data = json.dumps({"time": one.stamp, "state": fields}).encode()
+            header = {"stamp": {"sec": ns(one.stamp) // 10**9, "nsec": ns(one.stamp) % 10**9}}
+            message = {"header": header, **fields} if "/" in kind else {"time": one.stamp, "state": fields}
+            data = json.dumps(message).encode()
             writer.add_message(channels[one.topic], ns(one.received), data, ns(one.received))
         writer.finish()
     return file

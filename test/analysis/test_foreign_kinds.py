@@ -330,6 +330,12 @@ def formats() -> list[Case]:
     commanded = topic_map([], [], ["/force_command"], [], [])
     return [
         Case("JSON in a directory", json_directory, sent, {"a: frequency": 0.7}, "", MAPPED),
+        Case(
+            "JSON of ROS",
+            lambda path, sent: by_json(path, sent, "sensor_msgs/JointState"),
+            without(one("/joint_states", 100.0, 0.7, 0.5), lambda _: True, "velocity"),
+            sine(0.7, 0.5) | FRICTION,
+        ),
         Case("slash of a frame", by_rosbags, frames, step, "", commanded),
         Case("slash of a frame, SQLite", sqlite, frames, step, "", commanded),
     ]
