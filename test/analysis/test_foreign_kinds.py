@@ -411,6 +411,12 @@ def test_a_fault_is_read_right_and_said(case: Case, tmp_path: Path) -> None:
     assert all(sentence in every for sentence in case.absent)
 
 
+def test_a_map_to_more_values_than_names_is_refused(tmp_path: Path) -> None:
+    sent = [s._replace(fields=s.fields | {"position": [0.0, 1.0]}) for s in one("/state", 50.0, 0.7, 0.5, None, 1.0)]
+    with pytest.raises(ValueError, match="/state has 2 values for 1 names"):
+        analyse(by_json(tmp_path / "bag", sent), lambda doing: None, MAPPED)
+
+
 def other_topics(path: Path, storage: str, number: int) -> Path:
     """A bag of numbers alone."""
     is_ros1 = storage == "ros1"

@@ -205,6 +205,8 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
         widths = tuple(len(taken[q][k]) if q in taken else 0 for q in IN_JOINTS)
         fitting = given.joints if len(given.joints) == max(widths) else ()
         names = tuple(_at(topic, message, fields["name"])) if "name" in fields else fitting
+        if 0 < len(names) < max(widths) and given.fields.items() & fields.items():
+            raise ValueError(f"{topic} has {max(widths)} values for {len(names)} names in a message; map other fields")
         alike.setdefault((frames[k], names, widths), []).append(k)
     groups = []
     for (frame, names, _), rows in alike.items():
