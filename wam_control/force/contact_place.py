@@ -24,7 +24,7 @@ class ForcePlace(NamedTuple):
     cover, position, position_sd : cover, position along it and its standard deviation, m.
     is_pinned : whether the command or the parameters give it.
     is_known : whether it is pinned, or estimated well enough while something is touched.
-    is_touched : whether it is where the estimator finds the one contact, well enough or not.
+    is_touched : whether it is where the estimator finds the one contact, well enough or as well as it ever will.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     """
 
@@ -88,9 +88,11 @@ class ContactPlace:
         elif is_identified and not rejection:
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
             self._last = self._estimated(contact.cover, contact.position, sd)._replace(is_touched=True)
-        cover = axis.cover or parameters.contact_cover
+        cover = axis.cover or contact.cover or parameters.contact_cover
         assumed = parameters.contact_position if cover == parameters.contact_cover else math.nan
-        where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)
+        # with a longer press, all but what no torque shows will be known
+        is_found = contact.cover == cover and math.isnan(contact.position)
+        where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)._replace(is_touched=is_found)
         return where._replace(rejection=rejection)
 
     def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> ForcePlace:

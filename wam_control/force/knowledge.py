@@ -63,11 +63,13 @@ class Knowledge:
         is_sure = not contact.cover or contact.probability >= self._own.link_probability_limit
         if place is None or place.is_pinned or place.is_known or is_sure:
             return known
-        covers, apart = forces.covers, 0.0
+        covers, place_sd, probability = forces.covers, known.errors.place, contact.probability
         for name, length in zip(covers.names, covers.length, strict=True):
             if name != place.cover:
                 other = place._replace(cover=name, position=FORCE.middle * length)
                 there = axis._replace(sensed=forces.axis(q, other.pressed(axis.direction, axis.desired)))
-                apart = max(apart, abs(there.force(self._torques.now) - known.force))
-        apart *= math.sqrt(contact.probability * (1.0 - contact.probability))  # sd of one of two forces
-        return known._replace(errors=known.errors._replace(place=math.hypot(known.errors.place, apart)))
+                assert there.sensed is not None
+                apart = there.force(self._torques.now) - known.force
+                spread = probability * known.errors.place**2 + (1.0 - probability) * there.sensed.place_sd**2
+                place_sd = max(place_sd, math.sqrt(spread + probability * (1.0 - probability) * apart**2))
+        return known._replace(errors=known.errors._replace(place=place_sd))
