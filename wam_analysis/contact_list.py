@@ -64,8 +64,8 @@ class ListedContact(NamedTuple):
     cut : what cuts it off there, '' for nothing.
     true : the true link, 'none' where nothing was touched, '' where the true contact was not recorded.
     true_position, true_force : m and N; of that link, in the same time.
-    latency : s from the start of the true contact to this detection, below zero if the contact was reported before; NaN
-        where it cannot be known.
+    latency : s from the last instant without the true contact to this detection; not above zero if the contact was
+        reported before, NaN where it cannot be known.
     """
 
     step: str
@@ -175,7 +175,7 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
             if before and row < before:
                 continue
         if np.all(estimated.is_known[begin : row + 1]):
-            yield row, float(traces.stamp[row] - traces.stamp[begin]) / 1e9
+            yield row, float(traces.stamp[row] - traces.stamp[begin]) / 1e9 + traces.period
 
 
 def true_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[TouchedLink, ...]:

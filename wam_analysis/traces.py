@@ -118,6 +118,11 @@ class Traces(NamedTuple):
         return self.is_compared & ~self.true.acts & self.estimated.acts
 
     @property
+    def false_seconds(self) -> float:
+        """For how long, s."""
+        return float(np.count_nonzero(self.is_false)) * self.period
+
+    @property
     def false_percent(self) -> float:
         """In how much of the time without contact one is estimated, %; NaN where there is no such time."""
         free = np.count_nonzero(self.is_compared & ~self.true.acts)

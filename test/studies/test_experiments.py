@@ -338,13 +338,13 @@ def test_a_touch_is_judged_by_its_time_link_force_and_place(tmp_path: Path) -> N
     }
     run = recorded(load("wam-touch"), 0, topics, (Step("push", 0.0, 3.0, {}),), tmp_path)
     before, after, right, force, x = arm_forces.pushed({"push": run}).rows
-    assert before.measured == 0.0
-    assert after.measured == pytest.approx(0.06, abs=1e-6)
+    assert before.measured == pytest.approx(0.04)  # after the true contact
+    assert after.measured == pytest.approx(0.065, abs=1e-6)
     assert right.measured == pytest.approx(1.0 - 0.16, abs=0.01)
     assert not right.agrees
     assert (force.predicted, force.measured) == pytest.approx((12.0, 11.4))
     assert x.deviation == pytest.approx(0.03)
-    for estimated, expected in ((time > 0.5, (0.0, -0.495)), (there | ((time > 0.2) & (time < 0.4)), (0.2, 0.0))):
+    for estimated, expected in ((time > 0.5, (1.5, -0.49)), (there | ((time > 0.2) & (time < 0.4)), (0.2, 0.005))):
         wrong = {**topics, "contact/wrench": wrench(estimated, 11.4)}
         before, after, *_ = arm_forces.pushed({"push": recorded(load("wam-touch"), 0, wrong, (), tmp_path)}).rows
         assert (before.measured, after.measured) == pytest.approx(expected, abs=0.01)

@@ -61,7 +61,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         ]
         shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
     if np.any(known):
-        seconds = float(np.sum(traces.is_false)) * traces.period
+        seconds = traces.false_seconds
         findings.append(
             Finding("estimated without a contact", "s", seconds, note="false contacts, and the ends of others")
         )
@@ -114,9 +114,9 @@ def _numbers(name: str, contact: ListedContact, period: float, declared: float) 
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be a lower bound" * (not one.is_placed)
     yield Finding(f"{name}: error of the force's magnitude", "N", contact.force_error, note=least or unknown)
-    is_early = contact.latency < 0.0
+    is_early = contact.latency <= 0.0
     note = f"time until its detection, to within {1e3 * period:.0f} ms" if not is_early else "reported before it began"
-    yield Finding(f"{name}: latency", "ms", math.nan if is_early else 1e3 * (contact.latency + period), note=note)
+    yield Finding(f"{name}: latency", "ms", math.nan if is_early else 1e3 * contact.latency, note=note)
 
 
 def _doubts(name: str, contact: ListedContact) -> Iterator[str]:

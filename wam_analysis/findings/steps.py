@@ -187,7 +187,7 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
 def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     """Whether a contact was estimated where none is; none where that is not known."""
     traces = recording.traces
-    part, seconds = traces.false_percent, np.count_nonzero(traces.is_false) * traces.period
+    part, seconds = traces.false_percent, traces.false_seconds
     if math.isnan(part):
         return []
     question = f"contact estimated for at most {TOUCH.false_tolerance:g} % of the time without one"

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.contact_list import NO_LINK
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import BagError
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
@@ -137,13 +136,12 @@ def pushed(runs: Runs) -> Result:
     (run,) = runs.values()
     analysed = AnalysedRecording(run.bag, run.namespace)
     (push,) = analysed.touched
-    without = sum(one.end - one.begin for one in analysed.contacts if one.true == NO_LINK)
     found = next((one for one in analysed.contacts if one.true == push.link), None)
     if found is None:
         raise BagError(f"{run.bag.path}: the push on {push.link} was not detected")
     force, place = (found.true_force, found.estimate.force), (found.true_position, found.estimate.position)
     rows = [
-        below("estimated contact without a true one", without, "s", BOUNDS.latency, "chapter 2"),
+        below("false detections", analysed.traces.false_seconds, "s", BOUNDS.latency, "chapter 2"),
         below("detection latency", found.latency, "s", BOUNDS.latency, "chapter 2"),
         near(f"detection on {push.link}, part of its time", 1.0, push.right, "", "chapter 2", BOUNDS.wrong_link),
         near("force, median", *force, "N", "chapter 2", BOUNDS.push_in_motion),
