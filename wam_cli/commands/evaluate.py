@@ -8,7 +8,6 @@ from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
 
-from wam_cli.commands import evaluate_figures as figures
 from wam_cli.options import (
     COUNT,
     PAGE,
@@ -20,8 +19,11 @@ from wam_cli.options import (
     require_effect,
     take_batch,
     take_configuration,
+    writable_directory,
 )
 from wam_description.configuration import option_values
+from wam_studies.figures.catalogue import FIGURES, file_of, known, numbers, table
+from wam_studies.figures.style import draw_panels
 from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load
 from wam_studies.page import block, report, with_section
 
@@ -32,12 +34,31 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name in STUDIES:
         kind = load(name)
         study_arguments(parts.add_parser(name, help=kind.title), name, kind)
-    figures.arguments(parts.add_parser("figures", help="draw the figures of chapters 1 to 6 with the simulated plant"))
+    figures = parts.add_parser("figures", help="draw the figures of chapters 1 to 6 with the simulated plant")
+    figures.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"figures to draw, of {', '.join(FIGURES)}; default: all"
+    )
+    figures.add_argument(
+        "--to", type=writable_directory, default="docs/figures", help="directory for the figures; default: %(default)s"
+    )
+    take_batch(figures, "figures")
 
 
 def run(given: argparse.Namespace) -> int:
     """Evaluate a study or draw the figures; 1 if a required value is missed."""
-    return run_study(given) if given.part in STUDIES else figures.run(given)
+    return run_study(given) if given.part in STUDIES else draw_figures(given)
+
+
+def draw_figures(given: argparse.Namespace) -> int:
+    """Compute and draw figures of the thesis, and print how far the plant is from their lines."""
+    names = known(given.names or list(FIGURES))  # before anything is started
+    with batch_of(given, len(names)) as batch:
+        found = numbers(names, *batch)
+    given.to.mkdir(parents=True, exist_ok=True)
+    for name, values in found.items():
+        draw_panels(values, file_of(name, given.to))
+    print(table(found), end="")
+    return 0
 
 
 def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study[Any, Any]]) -> None:
@@ -145,8 +166,6 @@ def _write(given: argparse.Namespace, measured: Measurement) -> None:
     """Write the section, and the picture into a folder of the page's name."""
     page, study, shown = Path(given.write), measured.study, ""
     if panels := study.panels(measured.total):
-        from wam_studies.figures.style import draw_panels  # matplotlib is slow to import
-
         picture = page.with_suffix("") / f"{given.part}.png"
         picture.parent.mkdir(parents=True, exist_ok=True)
         draw_panels(panels, picture, 2)

@@ -6,20 +6,25 @@ import os
 import shutil
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
+from wam_analysis.table import markdown
 from wam_cli.options import PAGE, bounded, writable_directory
 from wam_ros.bring_up import Composition
 from wam_sim.batch import processes, results
 from wam_sim.progress import Progress
 from wam_studies.figures.style import draw_panels
+from wam_studies.page import kept_rows, section_of, with_section
 from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
 from wam_studies.thesis.evaluation import evaluate, text
-from wam_studies.thesis.page import write
+from wam_studies.thesis.rows import PAGE_HEAD, Result, summary
 from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
 from wam_studies.thesis.sweeping import SweptRun, record_run
 
 PICTURE = "result.png"
+SECTION = "experiments"  # of the page
+HEAD = ("experiment", "within bounds", "nearest to its bound", *PAGE_HEAD[1:])
 RECORDED = "recorded"  # in the directory of the samples: what they are cut from, by a path that is the same everywhere
 
 
@@ -84,7 +89,7 @@ def run(given: argparse.Namespace) -> int:
         print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
         found.append((experiment, result, picture))
     if given.write:
-        write(given.write, found)
+        _write(given.write, found)
     return 0 if all(result.agrees for _, result, _ in found) else 1
 
 
@@ -105,6 +110,27 @@ def _record(chosen: list[Experiment], directories: list[Path], jobs: int) -> Non
     ]
     with processes(min(jobs, len(cases))) as executor:
         results(record_run, cases, executor, report=Progress("runs", sys.stderr))
+
+
+def _write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> None:
+    """Write a row and a picture of each experiment into a page of the documentation, and keep the rows of others.
+
+    The pictures are copied into the folder with the name of the page; a result without panels has none.
+    """
+    folder = page.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    before = section_of(page, SECTION)
+    rows = kept_rows(before)
+    pictures = {line.rpartition("/")[2]: line for line in before.splitlines() if line.startswith("![")}
+    for experiment, result, picture in results:
+        name = f"`{experiment.name}`"
+        rows[name] = [name, *summary(result.rows)]
+        if result.panels:
+            shown = f"{folder.name}/{experiment.name}.png)"
+            pictures[shown.rpartition("/")[2]] = f"![{experiment.title}]({shown}"
+            shutil.copyfile(picture, folder / f"{experiment.name}.png")
+    text = "\n\n".join([markdown(HEAD, list(rows.values())).rstrip(), *pictures.values()])
+    page.write_text(with_section(page, SECTION, f"\n{text}", SECTION), encoding="utf-8")
 
 
 def _samples(given: argparse.Namespace) -> int:

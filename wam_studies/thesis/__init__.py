@@ -8,7 +8,6 @@ evaluation      from the bags of an experiment to its result
 recording       a bag as an experiment reads it: signals, parameters, steps
 bounds          what the evaluations allow
 rows            a result: predicted and measured quantities, curves, tables
-page            the result on a page of the documentation
 claims          what the thesis claims and where it is shown: rows of docs/thesis.yaml
 samples         the sample bags and their index; cutting makes them of recordings
 sweeping        an experiment with many parameter sets
