@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wam_description.arm import Arm, Cables, Covers
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -113,3 +115,10 @@ def one_joint(ratio: float = 14.0, cable: float = 8.33) -> Arm:
         gravity=(0.0, 0.0, 0.0),
         joint_sensors=True,
     )
+
+
+def natural_frequencies(jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
+    """Natural frequencies, rad/s, of rotor and link as two masses on two springs."""
+    stiffness = np.array([[ktr, -n * ktr], [-n * ktr, n * n * ktr + kc]])
+    scale = np.diag([jm**-0.5, jl**-0.5])
+    return np.sqrt(np.linalg.eigvalsh(scale @ stiffness @ scale))

@@ -13,7 +13,7 @@ from wam_bag.bag import read
 from wam_bag.cdr import CDR, MessageType
 from wam_bag.definitions import schema
 from wam_bag.message_text import definitions
-from wam_description.status import WALL_CLOCK
+from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 
 
 def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tuple[str, ...] = ()) -> list[str]:
@@ -91,7 +91,7 @@ def _fields(a: Any, b: Any, name: str) -> Iterator[str]:
     if isinstance(a, float) and isinstance(b, float):
         if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
             yield f"{name} {a!r} and {b!r}"
-    elif getattr(a, "key", None) in WALL_CLOCK and a.key == getattr(b, "key", None):
+    elif getattr(a, "key", None) in (BEHIND, REAL_TIME_FACTOR, SLIPS) and a.key == getattr(b, "key", None):
         return
     elif hasattr(a, "_fields"):
         for field in a._fields:

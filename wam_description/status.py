@@ -16,7 +16,6 @@ CHANGES = "parameter changes"  # fact: that the status has the live parameters t
 ENABLED = "enabled"  # mode of the driver in which no brake holds
 REFUSED = "refused"  # fact: topics whose present message a node does not take, separated by ', '
 EVENT = "event"  # beginning of the keys of an event: event.1, event.1.severity, event.1.values of its own
-WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")
 _TEXTS, _NUMBERS = ("mode", "fault", "step"), ("session", "since", "stamp")  # fields

@@ -19,6 +19,7 @@ from arms import (
     frictionless,
     ideal_mjcf,
     ideal_plant,
+    natural_frequencies,
     one_joint,
 )
 from contact_truth import cover_frame, frame, joint_torques, motor_from_joint, torques
@@ -63,13 +64,6 @@ def cable_stiffness(arm: Arm, motor: int) -> float:
 
 
 # resonances (4.4)
-
-
-def two_masses(jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
-    """Natural frequencies of rotor and link on two springs, rad/s."""
-    stiffness = np.array([[ktr, -n * ktr], [-n * ktr, n * n * ktr + kc]])
-    scale = np.diag([jm**-0.5, jl**-0.5])
-    return np.sqrt(np.linalg.eigvalsh(scale @ stiffness @ scale))
 
 
 def tones(signal: np.ndarray, step: float) -> np.ndarray:
@@ -121,7 +115,7 @@ def test_both_resonances_of_a_joint_of_the_arm_are_those_of_4_4(
     )
     ratio = {0: 29.97, 3: 19.15}[joint] * ratio_scale
     inertia = float(BODY.mass_matrix(start)[joint, joint]) + WAM.joints.armature[joint]
-    expected = two_masses(4.06745e-5, inertia, cable_stiffness(WAM, joint), stiffness, ratio)
+    expected = natural_frequencies(4.06745e-5, inertia, cable_stiffness(WAM, joint), stiffness, ratio)
     plant = released(arm, spring(arm, joint, stiffness), FINE)
     found = tones(ring(plant, joint, ratio, FINE, 4), 5e-4)
     np.testing.assert_allclose(found, expected, rtol=3e-3)

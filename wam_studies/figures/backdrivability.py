@@ -22,13 +22,11 @@ class Backdriven(NamedTuple):
     isotropy : least over greatest effective mass, 1 for an isotropic arm, 0 in a singular pose.
     rotor_share : of the effective mass, mean over directions.
     friction : push that moves no joint, N, median over directions.
-    mass : least and greatest effective mass, kg.
     """
 
     isotropy: float
     rotor_share: float
     friction: float
-    mass: tuple[float, float]
 
 
 class Backdriving:
@@ -85,8 +83,7 @@ class Backdriving:
         principal = np.maximum(np.linalg.eigvalsh(self.mobility(q, payload)), 1e-12)
         share = float(np.mean(1.0 - links / whole))
         pushed = float(np.median(self.pushes(q, self._directions)))
-        masses = 1.0 / principal[-1], 1.0 / principal[0]
-        return Backdriven(float(principal[0] / principal[-1]), share, pushed, masses)
+        return Backdriven(float(principal[0] / principal[-1]), share, pushed)
 
 
 PAYLOADS = {"none": 0.0, "2 kg": CASE.payload}
@@ -103,7 +100,7 @@ def backdrivability() -> Panels:
     tip, low, high = Backdriving(arm), np.array(arm.joints.lower), np.array(arm.joints.upper)
     poses = np.random.default_rng(CASE.backdriven_seed).uniform(low, high, (CASE.backdriven_poses, 4))
     part = (np.arange(CASE.backdriven_poses) + 0.5) / CASE.backdriven_poses
-    found = {name: np.array([tip.at(tuple(q), mass)[:3] for q in poses]) for name, mass in PAYLOADS.items()}
+    found = {name: np.array([tip.at(tuple(q), mass) for q in poses]) for name, mass in PAYLOADS.items()}
     return tuple(
         Panel(
             f"{'abc'[i]})",
