@@ -164,12 +164,12 @@ def read(
             take = partial(_collector, collectors, file, (begin_ns, end_ns, as_messages))
             if topics is None and begin_ns <= 0 and end_ns >= NEVER:
                 file.check_all()
-            for part in parts(file, topics, begin_ns, end_ns):
-                collector = take(part.channel)
+            for channel, batch in parts(file, topics, begin_ns, end_ns):
+                collector = take(channel)
                 try:
-                    collector.add(part.buffer, part.found)
+                    collector.add(*batch)
                 except Damage as error:
-                    raise Damage(f"topic {part.channel.topic}: {error}") from None
+                    raise Damage(f"topic {channel.topic}: {error}") from None
             listed = file.counts or file.loaded
             times += [listed.first, listed.last][: 2 * any(listed.by_channel.values())]
             for number, channel in file.channels.items():

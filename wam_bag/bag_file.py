@@ -4,20 +4,18 @@ import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import yaml
 from mcap.records import Channel
 
 from wam_bag import safe_yaml
-from wam_bag.arrays import Bytes
 from wam_bag.cdr import ENCODINGS, JSON, SCHEMAS, MessageType
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError, command
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_file import BagFile, McapFile
 from wam_bag.mcap_records import MAGIC
-from wam_bag.message_search import NEVER, Found
+from wam_bag.message_search import NEVER, MessageBatch
 from wam_bag.message_text import definitions, full_name
 from wam_bag.rosbags_file import SUFFIXES, RosbagsFile
 
@@ -123,18 +121,12 @@ def is_selected(topic: str, topics: Collection[str] | None) -> bool:
     return any(topic.endswith(f"/{name}") for name in topics if not name.startswith("/"))
 
 
-class TopicPart(NamedTuple):
-    """Some messages of a topic in memory, valid until the next part is taken."""
-
-    channel: Channel
-    buffer: Bytes
-    found: Found
-
-
 def parts(
     file: BagFile, topics: Collection[str] | None = None, begin: int = 0, end: int = NEVER
-) -> Iterator[TopicPart]:
+) -> Iterator[tuple[Channel, MessageBatch]]:
     """Messages of each selected topic, some megabytes at a time; at the end the file's own counts are checked.
+
+    Each part is valid until the next one is taken.
 
     Parameters
     ----------
@@ -155,7 +147,7 @@ def parts(
         for topic, members in by_topic.items():
             if is_selected(topic, topics):
                 is_own = np.logical_or.reduce([found.channels == number for number in members])
-                yield TopicPart(file.channels[members[0]], buffer, found.of(np.flatnonzero(is_own)))
+                yield file.channels[members[0]], MessageBatch(buffer, found.of(np.flatnonzero(is_own)))
     if file.counts is None or begin > 0 or end < NEVER:
         return
     for number, channel in file.channels.items():

@@ -67,7 +67,8 @@ class Reading:
 
     Parameters
     ----------
-    data : it, with its encapsulation.
+    data : it, with its encapsulation; of ROS 1 it has none.
+    is_packed : whether it is of ROS 1: little-endian, its values not aligned, its texts not terminated.
 
     Attributes
     ----------
@@ -75,7 +76,9 @@ class Reading:
     end : bytes that were read.
     """
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, is_packed: bool = False) -> None:
+        self._is_packed = is_packed
+        data = LITTLE_ENDIAN + data if is_packed else data
         try:
             self.order = ORDERS[data[:2]]
         except KeyError:
@@ -95,7 +98,7 @@ class Reading:
     def numbers(self, kind: str, count: int) -> tuple[int, np.dtype[Any]]:
         """Pass over numbers; their first byte and type."""
         dtype = number_type(self.order, kind)
-        if count:
+        if count and not self._is_packed:
             self.end += -(self.end - ENCAPSULATION) % dtype.itemsize
         return self.skip(dtype.itemsize * count), dtype
 
@@ -109,24 +112,8 @@ class Reading:
     def text(self) -> str:
         """A string without its terminator; bytes that are not UTF-8 are written with backslashes."""
         start = self.skip(self.count())
-        return self.data[start : self.end][:-1].decode("utf-8", "backslashreplace")
-
-
-class PackedReading(Reading):
-    """A message of ROS 1: little-endian, without an encapsulation, its values not aligned, its texts not terminated."""
-
-    def __init__(self, data: bytes) -> None:
-        super().__init__(LITTLE_ENDIAN + data)
-
-    def numbers(self, kind: str, count: int) -> tuple[int, np.dtype[Any]]:
-        """Pass over numbers; their first byte and type."""
-        dtype = number_type(self.order, kind)
-        return self.skip(dtype.itemsize * count), dtype
-
-    def text(self) -> str:
-        """A string; bytes that are not UTF-8 are written with backslashes."""
-        start = self.skip(self.count())
-        return self.data[start : self.end].decode("utf-8", "backslashreplace")
+        text = self.data[start : self.end]
+        return (text if self._is_packed else text[:-1]).decode("utf-8", "backslashreplace")
 
 
 @cache
@@ -203,17 +190,17 @@ class Decoder:
 
     def __init__(self, kind: str, encoding: str, definitions: Definitions) -> None:
         self._kind, self._definitions = kind, definitions
-        self._reading = PackedReading if encoding == ROS1 else Reading
+        self._is_packed = encoding == ROS1
         self._classes: dict[str, Any] = {}
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
-        return self._message(self._reading(data), self._kind)
+        return self._message(Reading(data, self._is_packed), self._kind)
 
     def _message(self, reading: Reading, kind: str) -> Any:
         fields = self._definitions[kind]
         values = [self._field(reading, inner, length) for _, inner, length in fields]
-        if not fields and self._reading is Reading:
+        if not fields and not self._is_packed:
             reading.skip(1)
         if kind not in self._classes:
             names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
@@ -368,20 +355,17 @@ def stamp_reader(name: str) -> Callable[[bytes], int | None]:
     return lambda data: None
 
 
-def first_stamp(data: bytes) -> int | None:
-    """The stamp that a message begins with, ns; None where it is too short to have one."""
-    if len(data) < ENCAPSULATION + 8:
+def first_stamp(data: bytes, at: int = ENCAPSULATION) -> int | None:
+    """The stamp that a message begins with, or has at a place, ns; None where it is too short to have one."""
+    if len(data) < at + 8:
         return None
-    sec, nanosec = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, ENCAPSULATION)
+    sec, nanosec = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, at)
     return int(sec) * SECOND + int(nanosec)
 
 
 def _element_stamp(data: bytes) -> int | None:
-    if len(data) < ENCAPSULATION:
-        return None
-    layout = "<IiI" if data[1] & 1 else ">IiI"
-    count, sec, nanosec = struct.unpack_from(layout, data.ljust(ENCAPSULATION + 12, b"\0"), ENCAPSULATION)
-    return int(sec) * SECOND + int(nanosec) if count else None
+    first = ENCAPSULATION + 4  # behind the count
+    return first_stamp(data, first) if any(data[ENCAPSULATION:first]) else None
 
 
 class ExactLength:

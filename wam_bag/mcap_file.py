@@ -120,12 +120,6 @@ class BagFile:
         """
         raise NotImplementedError
 
-    def count(self) -> MessageCounts:
-        """Messages counted by reading them all."""
-        for _ in self.batches():
-            pass
-        return self.loaded
-
     def has_all_definitions(self) -> bool:
         """Whether every channel that the file counts, and its schema, is known without reading chunks."""
         if self.counts is None or not self.counts.by_channel.keys() <= self.channels.keys():
