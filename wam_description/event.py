@@ -33,6 +33,7 @@ class Code(StrEnum):
     FAULT = "fault"  # the driver has put the brakes on, or does so for a node that reports it
     MODEL_OFF = "model_off"  # the model of the contact estimator is off by more than is tolerable
     DONE = "done"  # the scenario was played to its end
+    UNSTAMPED = "unstamped"  # a program sends messages without a stamp; they count as answers to the newest state
 
     @property
     def words(self) -> str:
@@ -90,9 +91,9 @@ def holding(code: Code, cause: str, **values: Value) -> Event:
     return warning(code, cause, **{HOLDS: 1.0, **values})
 
 
-def refused(topic: str, reason: str) -> Event:
-    """A message that is not taken; the reason is that of its check."""
-    return Event(Code.REFUSED, Level.WARN, {"topic": topic, "reason": reason})
+def refused(topic: str, reason: str, code: Code = Code.REFUSED) -> Event:
+    """A message that is not taken, or not as it is; the reason is that of its check."""
+    return Event(code, Level.WARN, {"topic": topic, "reason": reason})
 
 
 def fault(cause: str, **values: Value) -> Event:

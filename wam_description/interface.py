@@ -223,18 +223,26 @@ class Interface:
         """
         feeds: dict[str, list[Feed]] = {topic: [] for topic in declaration.inputs if topic in self.topics}
         unused = getattr(node, "unused", ())
-        for reaction in declaration.reactions:
+        clock: Synchroniser | None = None
+        found: dict[str, tuple[list[Input], Synchroniser]] = {}
+        for reaction in sorted(declaration.reactions, key=lambda one: not self.is_streamed(one.trigger.topic)):
             used = [item for item in reaction.inputs if item.topic in self.topics and item.topic not in unused]
-            synchroniser, work = self._synchroniser(reaction, used), self._work(declaration, node, reaction)
+            synchroniser = self._synchroniser(reaction, used, clock)
+            found[reaction.method] = used, synchroniser
+            if self.is_streamed(reaction.trigger.topic):
+                clock = clock or synchroniser
+        for reaction in declaration.reactions:
+            used, synchroniser = found[reaction.method]
+            work = self._work(declaration, node, reaction)
             for item in (reaction.trigger, *used):
                 arrays = item.arrays if self.topics[item.topic].side else WHOLE
                 feeds[item.topic].append(Feed(synchroniser, arrays, work, self.essential(reaction)))
         return feeds
 
-    def _synchroniser(self, reaction: Reaction, used: list[Input]) -> Synchroniser:
-        specs = {item.topic: self._spec(item) for item in used}
-        is_outer = self._is_outer(reaction)
-        return Synchroniser(self._timing, reaction.trigger.topic, specs, is_outer, reaction.thinned)
+    def _synchroniser(self, reaction: Reaction, used: list[Input], clock: Synchroniser | None) -> Synchroniser:
+        specs, trigger = {item.topic: self._spec(item) for item in used}, reaction.trigger
+        is_outer, started = self._is_outer(reaction), self._spec(trigger)
+        return Synchroniser(self._timing, trigger.topic, specs, is_outer, reaction.thinned, started, clock)
 
     def _is_outer(self, reaction: Reaction) -> bool:
         """Whether a reaction steps once per outer period."""

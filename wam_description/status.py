@@ -14,7 +14,7 @@ HELD_UP = "held up"  # fact: the nodes of its process, separated by blanks
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: that the status has the live parameters that were taken after a step
 ENABLED = "enabled"  # mode of the driver in which no brake holds
-REFUSED = "refused"  # fact: topics whose present message a node does not take, separated by ', '
+REFUSED = str(Code.REFUSED)  # fact: topics whose present message a node does not take, separated by ', '
 EVENT = "event"  # beginning of the keys of an event: event.1, event.1.severity, event.1.values of its own
 
 _CONNECTED = ("waiting", "connected")
@@ -55,15 +55,20 @@ def _value(text: str) -> Value:
     return value if isinstance(value, str | float | int) else text
 
 
-def with_refused(status: NodeStatus, refusals: Mapping[str, str]) -> NodeStatus:
-    """A status with messages that are refused before the node has them: why, by topic; none leaves it as it is."""
+def with_refused(status: NodeStatus, code: Code, refusals: Mapping[str, str]) -> NodeStatus:
+    """A status with what is wrong with messages before the node has them: why, by topic; none leaves it as it is.
+
+    Parameters
+    ----------
+    code : REFUSED, or that of messages that the node has nevertheless; a fact of this name lists the topics.
+    """
     if not refusals:
         return status
     reasons = "; ".join(dict.fromkeys(refusals.values()))
     message = reasons if status.level is Level.OK else f"{status.message}; {reasons}"
-    before = [topic for topic in status.facts.get(REFUSED, "").split(", ") if topic]
-    facts = {**status.facts, REFUSED: ", ".join(dict.fromkeys([*before, *refusals]))}
-    events = (*status.events, *(refused(topic, reason) for topic, reason in refusals.items()))
+    before = [topic for topic in status.facts.get(code, "").split(", ") if topic]
+    facts = {**status.facts, str(code): ", ".join(dict.fromkeys([*before, *refusals]))}
+    events = (*status.events, *(refused(topic, reason, code) for topic, reason in refusals.items()))
     return status._replace(level=max(status.level, Level.WARN), message=message, facts=facts, events=events)
 
 

@@ -13,8 +13,10 @@ Nothing is used that is from the future, too old, or from before the driver's se
 - A step waits for an input that answers an earlier state only until the clock is `longest_wait` ahead.  Two nodes
   that wait for each other go on so, after one of them has missed a state.
 - A session that a status announces forgets nothing by itself, as anybody can send a status; its first state does.
+- What a program sends is no clock, also where it starts a step: it is compared with the states that start another
+  step of the node.  Without a stamp it has that of the newest state when it comes.
 - A command of a program counts while it is streamed: a message of its own, which no other has preceded within
-  the limit, does nothing.  Without a stamp it has that of the newest state when it comes.
+  the limit, does nothing.
 """
 
 from collections import deque
@@ -29,6 +31,9 @@ class OutOfTime(ValueError):
     """A message too old or of the future; the text names the value, what is allowed and what to do."""
 
 
+CURE = "give a command the stamp of the state that it answers"
+
+
 class InputSpec(NamedTuple):
     """How an input goes with the trigger.
 
@@ -36,9 +41,10 @@ class InputSpec(NamedTuple):
     ----------
     outer : True where it comes once per outer period, False where it comes every inner period.
     delay : inner periods after which it is used.
-    streamed : True where a node of the bring-up sends it in every period, so that a step can wait for it.
+    streamed : True where a node of the bring-up sends it in every period, so that a step can wait for it; False where
+        it comes, or follows, from a program.
     limit_ns : age from which it counts as absent, ns, and how far it may be ahead of the clock.
-    is_command : whether it is a command of a program, which has to be streamed and may lack a stamp.
+    is_command : whether it is a command of a program, of which a single message does nothing.
     """
 
     outer: bool
@@ -48,6 +54,7 @@ class InputSpec(NamedTuple):
     is_command: bool = False
 
 
+TRIGGER = InputSpec(outer=True)
 Origin = tuple[int, Collection[str]]
 
 
@@ -101,6 +108,8 @@ class Synchroniser:
     inputs : the other inputs by topic.
     outer : whether steps come at the outer rate, so that waited inputs of other periods are of no interest.
     thinned : whether the trigger comes at the inner rate and only those of outer periods start a step.
+    started : how the trigger goes with the clock.
+    clock : of another step of the node, which the states start; for a trigger that a program sends.
 
     Attributes
     ----------
@@ -114,6 +123,8 @@ class Synchroniser:
         inputs: Mapping[str, InputSpec],
         outer: bool = False,
         thinned: bool = False,
+        started: InputSpec = TRIGGER,
+        clock: "Synchroniser | None" = None,
     ) -> None:
         self._outer, self._thinned = outer, thinned
         self._timing, self._trigger = timing, trigger
@@ -126,14 +137,14 @@ class Synchroniser:
         self._triggers: deque[tuple[int, Any]] = deque()
         self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
         self._groups: list[_Group] = []
-        self._inlets: dict[str, Inlet] = {trigger: self._start}
+        self._inlets: dict[str, Inlet] = {trigger: self._start if started.streamed else self._commanded(started, clock)}
         rules = {topic: (outer or spec.outer, spec.delay) for topic, spec in waited.items()}
         for is_outer, delay in dict.fromkeys(rules.values()):
-            limits = {topic: waited[topic].limit_ns for topic, rule in rules.items() if rule == (is_outer, delay)}
+            topics = [topic for topic, rule in rules.items() if rule == (is_outer, delay)]
             repeats = timing.outer_period_ns if is_outer else 1
-            group = _Group(delay * timing.period_ns, repeats, self._outer_phase, tuple(limits))
+            group = _Group(delay * timing.period_ns, repeats, self._outer_phase, tuple(topics))
             self._groups.append(group)
-            self._inlets.update({topic: self._waited(topic, group, limit) for topic, limit in limits.items()})
+            self._inlets.update({topic: self._waited(topic, group, waited[topic]) for topic in topics})
         self._inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
         self._lacks: tuple[_Group, int, int] | None = None  # see `_inputs`
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
@@ -172,7 +183,7 @@ class Synchroniser:
     def discard_commands(self, before: int) -> None:
         """Forget the commands whose stamp is before this time, ns: the brakes have been switched."""
         for newest in self._newest.values():
-            if newest.is_command:
+            if newest.spec.is_command:
                 newest.discard(before)
 
     def accepts(self, topic: str, stamp: int) -> bool:
@@ -187,7 +198,8 @@ class Synchroniser:
         Raises
         ------
         OutOfTime
-            where the stamp differs from that of the newest state by more than the limit of the input.
+            where the stamp differs from that of the newest state by more than the limit of the input, or where there is
+            none and the node knows no states.
         """
         return self._inlets[topic](stamp, value)
 
@@ -195,10 +207,10 @@ class Synchroniser:
         """What `put` does with the inputs of one topic, as a function of stamp and value."""
         return self._inlets[topic]
 
-    def _waited(self, topic: str, group: "_Group", limit_ns: int) -> Inlet:
+    def _waited(self, topic: str, group: "_Group", waited: InputSpec) -> Inlet:
         """The inlet of an input that steps wait for."""
         outer, period, phase = self._outer, self._outer_period, self._outer_phase
-        kept, triggers = group.kept, self._triggers
+        kept, triggers, limit_ns = group.kept, self._triggers, waited.limit_ns
 
         def take(stamp: int, value: Any) -> Sequence[Inputs]:
             if outer and stamp % period != phase:
@@ -206,7 +218,7 @@ class Synchroniser:
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
             if 0 < self._last < stamp - limit_ns:
-                self._require_present(stamp, limit_ns)
+                self._require_near(stamp, waited)
             slot = kept.get(stamp)
             if slot is None:
                 kept[stamp] = {topic: value}
@@ -231,18 +243,35 @@ class Synchroniser:
         def take(stamp: int, value: Any) -> Sequence[Inputs]:
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
-            if newest.is_command and not stamp:
+            if not stamp and not newest.spec.streamed:
                 stamp = self._last
-            self._require_present(stamp, newest.limit_ns)
-            if stamp < self._last - newest.limit_ns:
-                age, limit = seconds(self._last - stamp), seconds(newest.limit_ns)
-                raise OutOfTime(
-                    f"stamp {stamp} ns is {age:.3g} s older than the newest state, {self._last} ns, allowed: "
-                    f"{limit:.3g} s; give a command the stamp of the state that it answers"
-                )
+            self._require_near(stamp, newest.spec)
             if not newest.put(stamp, value, self._last):
                 self.strays += 1
             return self._complete() if self._triggers else ()
+
+        return take
+
+    def _commanded(self, started: InputSpec, clock: "Synchroniser | None") -> Inlet:
+        """The inlet of a trigger that a program sends."""
+
+        def take(stamp: int, value: Any) -> Sequence[Inputs]:
+            if clock is None:
+                if not stamp:
+                    raise OutOfTime(f"no stamp, and no state starts a step of this node that could give it one; {CURE}")
+                return self._start(stamp, value)
+            now = clock._last
+            stamp = stamp or now
+            clock._require_near(stamp, started)
+            if stamp < self._last:
+                if self._last <= now + started.limit_ns:
+                    self.strays += 1
+                    return ()
+                self.restart()  # the driver has started again
+            if stamp == self._last:
+                self._last_done = 0  # another one for the same state: the step has the nominal dt
+            self._last = 0  # it may go on from any other
+            return self._start(stamp, value)
 
         return take
 
@@ -287,14 +316,17 @@ class Synchroniser:
                 complete.append(inputs)
         return complete
 
-    def _require_present(self, stamp: int, limit_ns: int) -> None:
-        """Refuse what is ahead of the clock; before the first state there is none."""
-        if 0 < self._last < stamp - limit_ns:
-            raise OutOfTime(
-                f"stamp {stamp} ns is {seconds(stamp - self._last):.3g} s ahead of the newest state that this node "
-                f"has, {self._last} ns: the node is late, as the computer is busy; if you sent it, give it the stamp "
-                "of the state that it answers"
-            )
+    def _require_near(self, stamp: int, spec: InputSpec) -> None:
+        """Refuse what is too old for the clock or ahead of it; before the first state there is none."""
+        age = self._last - stamp
+        if not self._last or -spec.limit_ns <= age <= spec.limit_ns:
+            return
+        far = "older than" if age > 0 else "ahead of"
+        cure = f"this node is late, as the computer is busy, or {CURE}" if spec.streamed else CURE
+        raise OutOfTime(
+            f"stamp {stamp} ns is {seconds(abs(age)):.3g} s {far} the newest state that this node has, {self._last} "
+            f"ns, allowed: {seconds(spec.limit_ns):.3g} s; {cure}"
+        )
 
     def _is_announced(self, stamp: int) -> bool:
         """Whether a trigger confirms the session that was announced; its inputs that came before it are kept."""
@@ -315,7 +347,8 @@ class Synchroniser:
             self.restart()
             return True
         self.strays += 1
-        self._require_present(stamp, self._longest_jump)
+        if stamp > self._last:
+            self._require_near(stamp, TRIGGER._replace(limit_ns=self._longest_jump))
         return False
 
     def _has_missed(self, stamp: int) -> bool:
@@ -345,7 +378,7 @@ class Synchroniser:
     def ages(self) -> dict[str, float]:
         """How old the inputs are that no step waits for and that have come, as parts of their limits, by topic."""
         return {
-            topic: (self._last - newest.stamp) / newest.limit_ns
+            topic: (self._last - newest.stamp) / newest.spec.limit_ns
             for topic, newest in self._newest.items()
             if newest.stamp
         }
@@ -381,10 +414,10 @@ class Synchroniser:
 class _Newest:
     """The newest value of an input that no step waits for, and those that are ahead of the clock."""
 
-    __slots__ = ("_ahead", "_before", "_value", "is_command", "limit_ns", "stamp")
+    __slots__ = ("_ahead", "_before", "_value", "spec", "stamp")
 
     def __init__(self, spec: InputSpec) -> None:
-        self.limit_ns, self.is_command = spec.limit_ns, spec.is_command
+        self.spec = spec
         self._ahead: deque[tuple[int, Any]] = deque(maxlen=INPUTS.ahead)
         self.clear()
 
@@ -405,7 +438,7 @@ class _Newest:
         if stamp > clock:
             self._ahead.append((stamp, value))
             return True
-        if stamp < self.stamp or (stamp == self.stamp and not self.is_command):
+        if stamp < self.stamp or (stamp == self.stamp and self.spec.streamed):
             return False
         self._before, self.stamp, self._value = self.stamp, stamp, value
         return True
@@ -415,9 +448,9 @@ class _Newest:
         if self._ahead:
             for _ in range(len(self._ahead)):
                 self.put(*self._ahead.popleft(), clock)
-        if not self.stamp or clock - self.stamp > self.limit_ns:
+        if not self.stamp or clock - self.stamp > self.spec.limit_ns:
             return None
-        if self.is_command and not (self._before and self.stamp - self._before <= self.limit_ns):
+        if self.spec.is_command and not (self._before and self.stamp - self._before <= self.spec.limit_ns):
             return None
         return self.stamp, self._value
 

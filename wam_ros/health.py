@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from wam_bag.printable import printable
 from wam_description.agreement import DIGESTS, digests
 from wam_description.arm import Shared
-from wam_description.event import Event, Level, fault
+from wam_description.event import Code, Event, Level, fault
 from wam_description.event_text import sentence
 from wam_description.parameters import listed
 from wam_description.signals import NodeStatus
@@ -26,7 +26,6 @@ from wam_ros.ros_topics import DIAGNOSTICS, SECOND, header
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
-REFUSED_ON = "refused on "  # key of a count, before the name of a topic
 
 
 def problem_of(cause: str, reason: str) -> Event | None:
@@ -36,7 +35,7 @@ def problem_of(cause: str, reason: str) -> Event | None:
 
 @dataclass
 class Refusal:
-    """The messages of a topic that a node has refused.
+    """The messages of a topic that a node has refused, or that have another defect of one code.
 
     Attributes
     ----------
@@ -82,6 +81,7 @@ class Health:
         self.digests = digests(shared)
         self.problems: dict[str, Event] = {}
         self.refusals = defaultdict[str, Refusal](Refusal)
+        self._defects = {Code.REFUSED: self.refusals, Code.UNSTAMPED: defaultdict[str, Refusal](Refusal)}
         self.session = 0
         self.is_ready = False
         self._changes: tuple[int, dict[str, str]] = (-1, {})  # stamp of the step before, and what was taken after it
@@ -94,7 +94,9 @@ class Health:
     def publish(self, status: NodeStatus) -> None:
         """Publish the status of the node's work, where it has changed; a driver's has its problems already."""
         self.plain = status
-        status = with_refused(status, {topic: one.stated for topic, one in self.refusals.items() if one.stated})
+        for code, refusals in self._defects.items():
+            stated = {topic: one.stated for topic, one in refusals.items() if one.stated}
+            status = with_refused(status, code, stated)
         if self.problems and not status.mode:
             events = (*status.events, *self.problems.values())
             status = status._replace(level=Level.ERROR, message=self.problem, fault=self.problem, events=events)
@@ -184,8 +186,17 @@ class Health:
             self._node.get_logger().error(sentence(problem))
         self._node.take_problem(problem)
 
-    def refuse(self, topic: str, reason: str, is_reported: bool = False, stamp: int | None = None) -> None:
-        """Count a refused message; the first of several is logged, and the status has the reason until a report.
+    def refuse(
+        self,
+        topic: str,
+        reason: str,
+        is_reported: bool = False,
+        stamp: int | None = None,
+        code: Code = Code.REFUSED,
+    ) -> None:
+        """Count a refused message, or one of another defect.
+
+        The first of several is logged, and the status has the reason until a report.
 
         Parameters
         ----------
@@ -193,13 +204,13 @@ class Health:
             is logged.
         stamp : of a message that may be refused again, ns; it counts once.
         """
-        refusal = self.refusals[topic]
+        refusal = self._defects[code][topic]
         if stamp is not None:
             if stamp == refusal.stamp:
                 return
             refusal.stamp = stamp
         refusal.count, refusal.reason = refusal.count + 1, reason
-        log, text = self._node.get_logger(), f"{topic}: refused: {printable(reason, NODE_LIMITS.reason_length)}"
+        log, text = self._node.get_logger(), f"{topic}: {code.words}: {printable(reason, NODE_LIMITS.reason_length)}"
         if topic in self.plain.facts.get(REFUSED, "").split(", "):
             return  # the node states it itself
         if is_reported:
@@ -224,8 +235,9 @@ class Health:
         self._last = stamp
         self.facts |= facts()
         self._report()
-        if any(one.stated for one in self.refusals.values()):
-            for one in self.refusals.values():
+        every = [one for refusals in self._defects.values() for one in refusals.values()]
+        if any(one.stated for one in every):
+            for one in every:
                 one.stated, one.recent = one.recent, ""
             self.publish_again()
 
@@ -237,7 +249,11 @@ class Health:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""
         node, outlets = self._node, self._outlets
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
-        refused = {REFUSED_ON + topic: one.count for topic, one in self.refusals.items()}
+        refused = {
+            f"{code.words} on {topic}": one.count
+            for code, refusals in self._defects.items()
+            for topic, one in refusals.items()
+        }
         facts = {key: str(count) for key, count in sorted({**self.counts, **refused}.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
         facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}

@@ -18,13 +18,13 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from wam_description.configuration import BASE, Configuration, packaged
-from wam_description.event import Event, Level, fault
+from wam_description.event import Code, Event, Level, fault
 from wam_description.event_text import sentence
 from wam_description.interface import Feed, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import NodeStatus
 from wam_description.status import REFUSED
-from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
+from wam_description.synchroniser import CURE, Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
@@ -35,6 +35,8 @@ from wam_ros.requests import Request, RequestQueue
 from wam_ros.ros_parameters import follow
 from wam_ros.ros_topics import SECOND
 from wam_ros.run import run
+
+UNDATED = f"without a stamp it counts as an answer to the newest state, however late it is; {CURE}"
 
 
 class AdaptedNode(StackNode):
@@ -105,7 +107,8 @@ class AdaptedNode(StackNode):
         self._synchronisers.update(feed.synchroniser for feed in feeds)
         puts = [(feed, feed.synchroniser.inlet(topic), mask(feed.arrays) if feeds[1:] else None) for feed in feeds]
         # what the stack does not stream comes from, or follows from, a program of the user, whom the status informs
-        of_user = not self.interface.is_streamed(topic)
+        is_dated = self.interface.is_streamed(topic)
+        of_user = not is_dated
         of_user |= any(item.age == "command" for item in self._declaration.taken if item.topic == topic)
 
         def take(stamp: int, value: Any) -> None:
@@ -120,6 +123,8 @@ class AdaptedNode(StackNode):
                     self._step(inputs, feed)
                 if feed.synchroniser.strays != strays:
                     self.inlets.claims[topic].stray()
+            if not (stamp or is_dated):
+                self.health.refuse(topic, UNDATED, code=Code.UNSTAMPED)
 
         accepts = [partial(feed.synchroniser.accepts, topic) for feed in feeds]
         is_taken = accepts[0] if len(accepts) == 1 else lambda stamp: any(each(stamp) for each in accepts)

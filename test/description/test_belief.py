@@ -94,6 +94,32 @@ def test_a_single_command_does_nothing_and_a_stream_without_stamps_counts() -> N
     assert node.state(40) is None, "its age counts from its arrival"
 
 
+def test_a_step_that_a_program_starts_has_the_states_of_another_step_as_its_clock() -> None:
+    clock = Synchroniser(REALTIME, "state", {})
+    step = Synchroniser(REALTIME, "command", {}, started=FEEDBACK._replace(streamed=False), clock=clock)
+    with pytest.raises(OutOfTime, match="no stamp, and no state"):
+        Synchroniser(REALTIME, "command", {}, started=FEEDBACK._replace(streamed=False)).put("command", 0, "")
+    for now, stamp, used in (  # ms
+        (5, 0, 5),
+        (5, 0, 5),
+        (5, 15, 15),
+        (10, 12, None),
+        (2000, 1959, "older than"),
+        (2000, 2041, "ahead of"),
+        (2000, 1990, 1990),
+        (1, 0, 1),  # of a driver that has started again
+    ):
+        clock.restart()
+        clock.put("state", now * MS, "state")
+        if isinstance(used, str):
+            with pytest.raises(OutOfTime, match=f"{used}.*allowed: 0.04 s"):
+                step.put("command", stamp * MS, "")
+        else:
+            made = [(inputs.stamp, inputs.dt) for inputs in step.put("command", stamp * MS, "")]
+            assert [at for at, _ in made] == ([] if used is None else [used * MS])
+            assert all(dt > 0.0 for _, dt in made)
+
+
 def test_commands_from_before_the_brakes_were_switched_are_forgotten() -> None:
     node = Realtime(COMMAND)
     for value in ("one", "two"):

@@ -129,6 +129,7 @@ def test_a_trajectory_that_is_refused_is_in_the_status_until_it_ends(ros: Any, t
     beyond.points = [JointTrajectoryPoint(positions=[9.0, -1.8, 0.0, 1.45])]
 
     def is_refused() -> bool:
+        beyond.header.stamp.nanosec = feeder.stamp
         publisher.publish(beyond)
         return any(m.level == DiagnosticStatus.WARN and "joint1" in m.message for m in feeder.heard.seen["status"])
 

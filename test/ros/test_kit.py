@@ -1,5 +1,6 @@
 """The test kit: what `arm` does for a test, also of a user's own node, and what it leaves behind."""
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,27 +93,42 @@ def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
 
 
 @pytest.mark.parametrize(
-    ("taker", "topic", "text", "fields"),
+    ("taker", "topic", "stamp", "text", "fields"),
     [
-        ("velocity_loop", "joint_velocity_command", "allowed: 0.035 s", {"velocity": [0.0] * 4}),
-        ("force_loop", "joint_posture_command", "allowed: 0.2 s", {"position": [0.0, -0.6, 0.0, 0.5]}),
-        ("force_loop", "task_command", "1000 rows; send at most 4", {"rows": ((0.0,) * len(TASK_COLUMNS),) * 1000}),
+        ("transform", "joint_velocity_command", 1, "1.0. s older .*allowed: 0.035 s", {"velocity": [0.0] * 4}),
+        ("transform", "joint_velocity_command", 10**12, "999 s ahead .*allowed: 0.035 s", {"velocity": [0.0] * 4}),
+        ("force_loop", "joint_posture_command", 1, "allowed: 0.2 s", {"position": [0.0, -0.6, 0.0, 0.5]}),
+        ("force_loop", "task_command", 1, "1000 rows; send at most 4", {"rows": ((0.0,) * len(TASK_COLUMNS),) * 1000}),
     ],
 )
-def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_refuses_it(
-    taker: str, topic: str, text: str, fields: dict[str, Any], arm: RunningArm
+def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_takes_its_topic(
+    taker: str, topic: str, stamp: int, text: str, fields: dict[str, Any], arm: RunningArm
 ) -> None:
     """The node says why and goes on; a thousand axes took seconds, in which nobody answered an emergency stop."""
-    arm.start(nodes=INNER if taker == "velocity_loop" else ())
+    arm.start(nodes=INNER if taker == "transform" else ())
     arm.enable()
     arm.run(1.0)
     value = arm.value(topic, **fields)
-    arm.publisher(topic).publish(encoder(BY_NAME[topic], arm.configuration.shared)(1_000_000, value))
-    refusal = arm.run_until_refused(topic if taker == "force_loop" else topic.replace("joint", "motor"))
-    assert refusal.startswith(f"{taker}: ")
-    assert text in refusal
+    arm.publisher(topic).publish(encoder(BY_NAME[topic], arm.configuration.shared)(stamp, value))
+    assert re.match(f"{taker}: .*{text}", arm.run_until_refused(topic))
     arm.run_until(lambda: arm.status(taker).level is Level.WARN)
-    assert topic.removeprefix("joint") in arm.status(taker).facts["refused"]
+    assert arm.status(taker).facts["refused"] == topic
+
+
+def test_a_command_without_a_stamp_counts_as_now_and_the_status_says_so(arm: RunningArm) -> None:
+    """Nobody can see how late it is."""
+    arm.start(nodes=INNER)
+    arm.enable()
+    topic = "joint_velocity_command"
+    encode = encoder(BY_NAME[topic], arm.configuration.shared)
+    for speed in (0.1, 0.2) * 40:  # two in a period: the newest counts
+        arm.publisher(topic).publish(encode(0, arm.value(topic, velocity=[0.0, 0.0, speed, 0.0])))
+        if speed > 0.1:
+            arm.run(0.005)
+    assert arm.truth.qd[2] > 0.15
+    assert (arm.status("transform").level, arm.status("transform").facts["unstamped"]) == (Level.WARN, topic)
+    arm.run_until(lambda: arm.status("transform").level is Level.OK)
+    assert abs(arm.truth.qd[2]) < 0.01
 
 
 def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
