@@ -44,6 +44,7 @@ class Simulation:
 
     Attributes
     ----------
+    configuration, steps : what is simulated.
     driver : the driver, for a look at the plant.
     nodes : the other nodes by name.
     scenario : the scenario, for its failure.
@@ -59,6 +60,7 @@ class Simulation:
         if "driver" not in entries:
             raise ParameterError(f"nodes are {', '.join(entries)}; a simulation needs the driver")
         configuration = configuration.with_values({"nodes": [*entries, SCENARIO], "timing.mode": "lockstep"})
+        self.configuration = configuration
         shared = configuration.shared
         self._timing = shared.timing
         self._patience = round(shared.timing.timeout * 1e9)  # ns, for which the scenario may get nothing
@@ -76,7 +78,7 @@ class Simulation:
         self._currents: tuple[int, list[float]] = (0, [])
         self._reported: tuple[Mode, tuple[Event, ...]] | None = None
         self._warned: dict[str, set[tuple[Any, ...]]] = {}  # of each node, what its last status was about
-        self._steps = steps
+        self.steps = steps
         self._begins: list[int] = []  # of the steps, ns
         self._events: list[tuple[int, tuple[Event, ...]]] = []  # of the force loop, each time these change
         self.nodes: dict[str, Any] = {}
@@ -140,7 +142,7 @@ class Simulation:
     @property
     def played(self) -> list[PlayedStep]:
         """The steps that have begun so far, and when."""
-        times = zip(self._steps, self._begins, [*self._begins[1:], self.driver.stamp], strict=False)
+        times = zip(self.steps, self._begins, [*self._begins[1:], self.driver.stamp], strict=False)
         return [PlayedStep(*one) for one in times]
 
     @property

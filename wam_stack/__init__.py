@@ -14,7 +14,10 @@ arm       kinematics, Jacobians and gravity torques
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.analysis import analyse as _analyse
@@ -31,6 +34,7 @@ from wam_control.task.scenario import ScenarioStep, load_for
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_sim.recorded_run import recorded_run
+from wam_sim.simulated_bag import record
 from wam_sim.simulation import Simulation
 
 __all__ = ["IdentifiedModel", "analyse", "arm", "guard", "identify", "load", "read", "simulate"]
@@ -86,14 +90,29 @@ def simulate(
     return run
 
 
-def analyse(recording: str | Path | Mapping[str, Any]) -> Analysis:
-    """Analyse a recording of this stack or of another robot: a bag, a CSV file, or a table such as a DataFrame.
+def analyse(recording: str | Path | Mapping[str, Any] | Simulation) -> Analysis:
+    """Analyse a recording of this stack or of another robot.
+
+    Parameters
+    ----------
+    recording : a bag, a CSV file, a table such as a DataFrame, or a simulation, which is played again and recorded.
 
     Raises
     ------
     BagError
         where it cannot be read, or is empty.
+    ValueError
+        for a simulation that was not played to its end, or was changed by hand: played again it differs.
     """
+    if isinstance(recording, Simulation):
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "simulation"
+            record(recording.configuration, recording.steps, path)
+            motors = read(path, ["motor_states"]).series("motor_states")
+            before = [row.values for row in recording.rows["motor_states"]]
+            if not np.array_equal(np.transpose(before), [values for name, values in motors.items() if name != "time"]):
+                raise ValueError("the simulation differs when it is played again: play it to its end, by itself")
+            return analyse(path)
     return _analyse(recording, lambda doing: None)
 
 

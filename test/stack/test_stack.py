@@ -20,10 +20,14 @@ def test_a_configuration_has_values_of_ones_own_and_refuses_others() -> None:
         wam_stack.load("nothing")
 
 
-def test_a_scenario_is_played_and_its_rows_are_there() -> None:
+def test_a_scenario_is_played_and_analysed() -> None:
     steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("rest", 0.3)]
     run = wam_stack.simulate("wam", steps)
     assert len(run.rows["joint_states"]) == pytest.approx(0.4 / 0.005, abs=3)
+    assert "2 steps" in wam_stack.analyse(run).sections[0].sentences[0]
+    run.step()
+    with pytest.raises(ValueError, match="played again"):
+        wam_stack.analyse(run)
 
 
 def test_what_cannot_be_played_is_an_error_with_its_reason() -> None:
