@@ -32,7 +32,7 @@ from wam_description.driver_contract import REQUIREMENTS
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import fields
-from wam_description.topics import TOPICS
+from wam_description.topics import FORCE_AXIS, TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
 from wam_sim.batch import processes
@@ -246,6 +246,7 @@ def blocks() -> dict[str, Callable[[], str]]:
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
         ),
         "dither": lambda: dither(configuration),
+        "columns of force_axis": lambda: markdown(["column", "meaning"], list(FORCE_AXIS.items())),
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
         "figures": lambda: figures_table(found_figures()),
         "equations": equations,

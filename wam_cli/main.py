@@ -107,7 +107,7 @@ def _ended_by(error: BaseException, command: str, parser: argparse.ArgumentParse
         from wam_bag.errors import BagError
 
         parser.exit(
-            1 + isinstance(error, BagError),
+            1 + (isinstance(error, BagError) or command == "analyse"),  # its 1 is of the recorded run
             printable(f"wam {command}: {error}{_hint(error, command)}", kept="\n") + "\n",
         )
     raise error

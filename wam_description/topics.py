@@ -57,25 +57,25 @@ FRICTION_COLUMNS: Final = (
     "load_sd",
 )
 
-FORCE_AXIS_COLUMNS: Final = (
-    "event",  # number of `wam_description.event.Code`: 0 where the command is obeyed
-    "holds",  # 1 where the arm holds its position because of it
-    "doubt",  # predicted error of the true force per tolerated error
-    "tolerance",  # N
-    "torques",  # N, parts of the predicted error: the measured torques
-    "friction",  # N, friction of the surface
-    "place",  # N, the position of the contact
-    "resting",  # N, torques that were there before the touch
-    "moving_surface",  # N, a surface that moves ahead of the loop
-    "slow_arm",  # N, infinite where the arm gets there too slowly
-    "shaking_arm",  # N, the arm's own shaking
-    "force_sd",  # N, standard deviation of the measured force; infinite where the force has no lever
-    "lever",  # m, size of the joint torques per force
-    "apparent_mass",  # kg, measured force per acceleration along the force
-    "speed_fraction",  # velocity along the force per commanded one, 0 to 1
-    "position",  # m along the cover where the force acts
-    "position_sd",  # m
-)
+FORCE_AXIS: Final = {  # columns of the table, and what they mean
+    "event": "number of `wam_description.event.Code`; 0 if the command is obeyed",
+    "holds": "1 if the arm holds its position because of the event",
+    "doubt": "predicted force error divided by the tolerated one",
+    "tolerance": "tolerated force error, N",
+    "torques": "part of the predicted error: errors of the measured torques, N",
+    "friction": "the same: friction of the surface, N",
+    "place": "the same: position of the contact, N",
+    "resting": "the same: torques that were there before the touch, N",
+    "moving_surface": "the same: a surface that moves ahead of the loop, N",
+    "slow_arm": "the same, N; infinite if the arm reaches the force too slowly",
+    "shaking_arm": "the same: shaking of the arm itself, N",
+    "force_sd": "standard deviation of the measured force, N; infinite if the force has no lever",
+    "lever": "size of the joint torques per force, m",
+    "apparent_mass": "measured force per acceleration along the force, kg",
+    "speed_fraction": "velocity along the force divided by the commanded one, 0 to 1",
+    "position": "position of the contact along the cover, m",
+    "position_sd": "its standard deviation, m",
+}
 
 TASK_COLUMNS: Final = (
     "kind",  # number of `wam_control.force.task.AxisKind`: 1 force, 2 velocity, 3 position, 4 impedance
@@ -279,8 +279,8 @@ TOPICS: Final = (
         TABLE,
         "display",
         "how well the commanded force is measured and held; frame = the cover; no row without a command; "
-        "published also at each new event; float64 columns: see docs/force.md",
-        columns=FORCE_AXIS_COLUMNS,
+        "published also at each new event; float64 columns: see below",
+        columns=tuple(FORCE_AXIS),
     ),
     _joints(
         "external_torque_zero",

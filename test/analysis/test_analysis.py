@@ -401,9 +401,12 @@ def test_the_command_writes_text_json_and_page(
     assert max(map(len, out.splitlines())) <= 100
     assert "reading" in err
     (tmp_path / "t.csv").write_text("t,q1\n0.0,1.0\n")
-    for name, said in (("nothing", "does not exist"), ("no.csv", "No such file"), ("t.csv", "has no column 'time'")):
+    for name, said, *more in (
+        ("nothing", "does not exist"), ("no.csv", "No such file"), ("t.csv", "has no column 'time'"),
+        ("t.csv", "'x' is neither a number nor one of", "--unit", "position=x"),
+    ):  # fmt: skip
         with pytest.raises(SystemExit) as ended:
-            main(["analyse", str(tmp_path / name)])
+            main(["analyse", str(tmp_path / name), *more])
         err = capsys.readouterr().err
         assert (ended.value.code, said in err, "another robot" in err) == (2, True, False)
 

@@ -16,7 +16,7 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
-from wam_description.topics import FORCE_AXIS_COLUMNS
+from wam_description.topics import FORCE_AXIS
 from wam_description.wiring import Input, Outputs, reaction
 
 
@@ -148,7 +148,7 @@ class ForceLoopNode:
             "position_sd": place.position_sd,
             **known.errors._asdict(),
         }
-        return {"force_axis": Table(place.cover, (tuple(values[name] for name in FORCE_AXIS_COLUMNS),))}
+        return {"force_axis": Table(place.cover, (tuple(values[name] for name in FORCE_AXIS),))}
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
