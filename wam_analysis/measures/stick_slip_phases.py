@@ -6,7 +6,7 @@ import numpy as np
 
 from wam_analysis.measures.runs import runs, without_short
 from wam_analysis.thresholds import SHAFT
-from wam_bag.arrays import Numbers, Rows
+from wam_bag.arrays import Mask, Numbers, Rows
 
 
 class Phases(NamedTuple):
@@ -41,15 +41,13 @@ def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
     """
     if not (rest > 0.0 and np.all(np.isfinite(velocity))):
         raise ValueError(f"rest is {rest!r}; it must be above the noise of the velocity, which must be finite")
-    still = without_short(np.abs(velocity) <= rest, shortest)
+    return _phases(without_short(np.abs(velocity) <= rest, shortest), velocity)
+
+
+def _phases(still: Mask, velocity: Numbers) -> Phases:
     sticks, slips = runs(still), runs(~still)
     directions = np.array([np.sign(np.mean(velocity[a:b])) for a, b in slips], dtype=np.float64)
-    return Phases(
-        sticks=sticks,
-        slips=slips,
-        directions=directions,
-        stuck=float(np.mean(still)) if len(still) else 0.0,
-    )
+    return Phases(sticks, slips, directions, float(np.mean(still)) if len(still) else 0.0)
 
 
 def without_turns(phases: Phases, velocity: Numbers, rest: float) -> Phases:
@@ -75,11 +73,7 @@ def without_turns(phases: Phases, velocity: Numbers, rest: float) -> Phases:
         ],
         dtype=np.bool_,
     )
-    if not np.any(turns):
-        return phases
     still = np.zeros(len(velocity), dtype=np.bool_)
     for a, b in phases.sticks[~turns]:
         still[a:b] = True
-    sticks, slips = runs(still), runs(~still)
-    first = np.array([begins[a] for a, _ in slips.tolist()])
-    return Phases(sticks, slips, first, float(np.mean(still)))
+    return _phases(still, velocity)
