@@ -8,7 +8,10 @@ from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.transmission_signals import CABLE
 from wam_analysis.measures.friction import UNKNOWN, Friction
 from wam_analysis.recording import AnalysedRecording
+from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
+from wam_description.parts import Joints, Motors
+from wam_description.transmission_map import TransmissionMap
 
 UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
 ONE_WAY = "measured in one direction only, includes any offset"
@@ -28,9 +31,7 @@ def friction_section(recording: AnalysedRecording) -> Section:
     for i, (name, found) in enumerate(motors.items()):
         findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
     for i, (name, found) in enumerate(joints.items()):
-        bearing = arm.joints
-        configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
-        findings += _friction_findings(name, found, configured, "cable torque less strain")
+        findings += _friction_findings(name, found, _configured(arm.joints)[:, i], "cable torque less strain")
     sentences, every = [], {**motors, **joints}
     unsure = [
         f"{kind} friction of {name}" for name, one in every.items() for kind in UNITS if getattr(one, kind).is_vague
@@ -47,36 +48,33 @@ def friction_section(recording: AnalysedRecording) -> Section:
     return Section("friction", "Friction", stated, findings, lacking, flagged)
 
 
-def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
-    """Configured static, dynamic and viscous friction, with the joint's if it is part of the measured one."""
-    motors, joints = arm.motors, arm.joints
-    own = [motors.static_friction[i], motors.dynamic_friction[i], motors.viscous_friction[i]]
-    column = np.reshape(arm.joint_from_motor, (len(joints.names), len(motors.names)))[:, i]
-    if not alone and int(np.count_nonzero(column)) == 1:
-        own[0] += float(np.abs(column) @ np.array(joints.static_friction))
-        own[1] += float(np.abs(column) @ np.array(joints.dynamic_friction))
-        own[2] += float(column**2 @ np.array(joints.viscous_friction))
-    elif not alone:
-        own = [math.nan] * 3
-    return own[0], own[1], own[2]
+def _configured(shafts: Motors | Joints) -> Numbers:
+    """Static, dynamic and viscous friction of some shafts, (3, n)."""
+    return np.array([getattr(shafts, f"{kind}_friction") for kind in UNITS])
 
 
-def _named(shaft: str, kind: str) -> str:
-    return f"{shaft}: {kind} friction"
+def _of_motor(arm: Arm, i: int, alone: bool) -> Numbers:
+    """Configured friction, (3,), with the joint's if it is part of the measured one; NaN with several joints."""
+    own, column = _configured(arm.motors)[:, i], np.abs(TransmissionMap.of(arm).joint_from_motor[:, i])
+    if alone:
+        return own
+    if np.count_nonzero(column) > 1:
+        return np.full(3, math.nan)
+    return own + (np.array([column, column, column**2]) * _configured(arm.joints)).sum(axis=1)
 
 
-def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
+def _friction_findings(name: str, found: Friction, configured: Numbers, note: str) -> list[Finding]:
     """Of one shaft."""
     about = {"static": f"{found.breakaways} breakaways"}
     if math.isnan(found.offset) and math.isfinite(found.dynamic.value):
         about["dynamic"] = ONE_WAY
     findings = []
-    for (kind, unit), predicted in zip(UNITS.items(), configured, strict=True):
+    for (kind, unit), predicted in zip(UNITS.items(), configured.tolist(), strict=True):
         doubt, known = "", getattr(found, kind)
         if known.is_vague:
             value, error = map(shown, known)
             doubt = f"not identifiable: {value} +-{error}" if math.isfinite(known.error) else "not identifiable"
             known = UNKNOWN
         text = "; ".join(filter(None, (about.get(kind), doubt, note)))
-        findings.append(Finding(_named(name, kind), unit, known.value, predicted, text, known.error))
+        findings.append(Finding(f"{name}: {kind} friction", unit, known.value, predicted, text, known.error))
     return findings
