@@ -1,4 +1,4 @@
-# The stack with ROS as wheels, and a browser for the tests of the live page.  docs/install.md shows how to use it.
+# The stack with ROS as wheels, and a browser for the tests of the live page.  docs/tutorial.md shows how to use it.
 FROM debian:bookworm-slim
 
 RUN apt-get update \

@@ -69,7 +69,6 @@ echo '== pytest'; $(PY) -P -m pytest --dist loadgroup $(PYTEST_ARGS) $(ARGS) || 
 if [ -n "$$failed" ]; then echo "make $@: failed:$$failed" >&2; exit 1; fi
 endef
 
-# demo_under_load.py takes an hour by itself
 bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of one run
 	@$(PY) benchmarks/bench.py $(ARGS)
 

@@ -89,7 +89,7 @@ def extensions():
     mujoco = find_spec("mujoco")
     if mujoco is None or mujoco.origin is None:
         sys.exit(f"WAM_COMPILE needs the headers of MuJoCo: {COMPILE}")
-    given = ["--config-file", "pyproject.toml", "--ignore-missing-imports"]  # stubs are for `make lint`
+    given = ["--config-file", "pyproject.toml", "--ignore-missing-imports"]  # stubs are for `make check`
     found = mypycify([*COMPILED, *given], opt_level="3", multi_file=True, target_dir="build/mypyc")
     headers = Path(mujoco.origin).parent / "include"
     found.append(Extension("wam_driver.fast_steps", ["wam_driver/fast_steps.c"], include_dirs=[str(headers)]))

@@ -13,6 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TextIO
 
 from wam_bag.printable import printable
+from wam_description.nodes import installation
 from wam_ros.process_signals import SIGNALS, end_at_once_on_signals, ignore_signals
 
 # each command is the module of its name in wam_cli.commands, imported when it is called
@@ -63,8 +64,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if COMPLETING in os.environ:
         _complete()
     words = list(sys.argv[1:] if arguments is None else arguments)
-    command = _command(words)
-    parser = _parser(command)
+    try:
+        command = _command(words)
+        parser = _parser(command)
+    except ModuleNotFoundError as error:
+        sys.exit(_missing(words[0], error))
+    except ImportError as error:
+        sys.exit(f"wam {words[0]}: {error}; install what is missing by the package manager of the system")
     if not words:
         parser.print_help()
         sys.exit(0)
@@ -148,22 +154,17 @@ def _command(words: list[str]) -> Any:
     """The module of the command that is called, if there is one."""
     if not words or words[0] not in COMMANDS:
         return None
-    try:
-        return importlib.import_module(f"wam_cli.commands.{words[0]}")
-    except ModuleNotFoundError as error:
-        sys.exit(_missing(words[0], error))
-    except ImportError as error:
-        sys.exit(f"wam {words[0]}: {error}; install what is missing by the package manager of the system")
+    return importlib.import_module(f"wam_cli.commands.{words[0]}")
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> int:
-    """Print how to install a module that is missing; raise the error for one of which that is not known."""
+    """Print how to install a module that is missing; raise the error for one of the stack or of Python itself."""
     module = (error.name or "").partition(".")[0]
     ways = {name: f"pip install 'wam_stack[{extra}]'" for extra, modules in EXTRAS.items() for name in modules}
     ways |= {name: f"apt install ros-jazzy-{name.replace('_', '-')}" for name in OF_ROS}
-    if module not in ways:
+    if not module or module.startswith("wam_") or module in sys.stdlib_module_names:
         raise error
-    needs = f"it needs '{module}', which is not installed; install it with: {ways[module]}"
+    needs = f"it needs '{module}', which is not installed; install it with: {ways.get(module) or installation(module)}"
     sys.stderr.write(f"wam {command}: {needs}\n")
     return 1
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.defects import Check, UnusableOutput, defect_finder, output_check
-from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
+from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE, installation
 from wam_description.parameters import ParameterError, meant
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.thresholds import FILES, INPUTS
@@ -43,9 +43,9 @@ def declared(entry: str) -> Declaration:
     try:
         imported = importlib.import_module(module)
     except ModuleNotFoundError as error:
-        raise ParameterError(
-            f"node '{entry}' cannot be imported: {error}; check that '{error.name}' is installed or on PYTHONPATH"
-        ) from error
+        own = f"check that '{error.name}' is installed or on PYTHONPATH"
+        cure = installation(error.name or "") if entry in NODES else own
+        raise ParameterError(f"node '{entry}' cannot be imported: {error}; {cure}") from error
     except Exception as error:
         raise ParameterError(f"node '{entry}' cannot be imported: {raised(error)}; correct '{module}'") from error
     if "<locals>" in name:

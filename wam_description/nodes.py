@@ -18,3 +18,11 @@ ONE, GROUPED, EACH = "one", "grouped", "each"  # process for all nodes, for each
 # another name, as of your own, has a process of its own: a long step would hold up the force loop.
 INNER, OUTER = "inner", "outer"
 GROUPS: Final = {**dict.fromkeys(NODES, OUTER), "driver": INNER, "recorder": "recorder"}
+
+_ON_PYPI: Final = {"pinocchio": "pin", "yaml": "pyyaml"}  # modules that have another name there
+
+
+def installation(module: str) -> str:
+    """How to install a module that a node or a command needs."""
+    name = module.partition(".")[0]
+    return f"pip install {_ON_PYPI.get(name, name)}"

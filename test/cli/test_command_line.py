@@ -47,6 +47,7 @@ def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) 
         ("xyzzy", "invalid choice: 'xyzzy' (choose from 'demo', 'up', "),
         ("call enabel", "there is no 'enabel'; did you mean 'enable'?"),
         ("evaluate contct", "there is no 'contct'; did you mean 'contact'?"),
+        ("demo --task creep", "no task is named 'creep'; choose from follow-surface"),
         ("up --name left", "wam up: error: unrecognized arguments: --name left"),  # no abbreviation of --namespace
     ],
 )
@@ -99,20 +100,30 @@ def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     assert "it is empty; give a name or a file, or leave the option out" in err
 
 
-def test_an_extra_that_is_missing_is_named_in_one_sentence(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("module", "way"),
+    [
+        ("rclpy", "pip install 'wam_stack[ros]'"),
+        ("quadprog", "pip install quadprog"),
+        ("pinocchio.visualize", "pip install pin"),
+        ("tf2_msgs", "apt install ros-jazzy-tf2-msgs"),
+    ],
+)
+def test_a_package_that_is_missing_is_named_in_one_sentence(
+    module: str, way: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     load = importlib.import_module
 
     def without(name: str, package: str | None = None) -> Any:
         if name == "wam_cli.commands.call":
-            raise ModuleNotFoundError("No module named 'rclpy'", name="rclpy")
+            raise ModuleNotFoundError(f"No module named '{module}'", name=module)
         return load(name, package)
 
     monkeypatch.setattr(importlib, "import_module", without)
     code, out, err = said(capsys, "call", "enable")
     assert (code, out) == (1, "")
-    assert err == "wam call: it needs 'rclpy', which is not installed; install it with: pip install 'wam_stack[ros]'\n"
+    name = module.partition(".")[0]
+    assert err == f"wam call: it needs '{name}', which is not installed; install it with: {way}\n"
 
 
 def test_the_extras_are_those_of_the_package() -> None:

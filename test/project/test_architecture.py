@@ -188,7 +188,7 @@ def attributes_of(kind: ast.ClassDef) -> int:
 
 @pytest.mark.slow
 def test_numbers_have_homes_and_classes_are_small():
-    """A threshold belongs to the dataclass of its subsystem; the force loop's classes are the known exceptions."""
+    """A threshold belongs to the dataclass of its subsystem."""
     trees = modules_under(ROOT).values()
     assert sum(map(constants_in, trees)) <= MOST_CONSTANTS
     classes = [one for tree in trees for one in ast.walk(tree) if isinstance(one, ast.ClassDef)]

@@ -48,7 +48,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     played = parser.add_mutually_exclusive_group()
     played.add_argument(
         "--task",
-        type=filled,
+        type=_task,
         metavar="NAME",
         help=f"play this task instead of the demonstration: {', '.join(tasks())}, or a YAML file of your own",
     )
@@ -58,6 +58,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     take_page(parser, default=None)
     take_configuration(parser)
+
+
+def _task(name: str) -> str:
+    """The name of a packaged task, or the path of a YAML file."""
+    if name.endswith(".yaml") or filled(name) in tasks():
+        return name
+    raise argparse.ArgumentTypeError(
+        f"no task is named '{name}'; choose from {', '.join(tasks())}, or name a YAML file"
+    )
 
 
 def run(given: argparse.Namespace) -> int:
