@@ -122,6 +122,7 @@ SENTENCES: Final = {  # by cause
     "ended": "{node} has ended; start it again, or 'wam up' if that started it",
 }
 HOLDING: Final = "; the arm holds its position"
+GOES_BACK: Final = "other_link"  # cause for which it does not, as its sentence states
 SINCE: Final = ("without a contact", "since the force was last right or rising")
 REACH: Final = (
     "no contact is seen: bring the arm to the surface first, command more force, or bend the arm",
@@ -152,7 +153,7 @@ def sentence(event: Event) -> str:
         return str(event.values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
     values = {**event.values, **_parts(event.values)}
     text = (UNBOUNDED if values.get("error") == math.inf else SENTENCES)[cause]
-    end = HOLDING if event.holds and "hold" not in text and "goes back" not in text else ""
+    end = HOLDING if event.holds and cause != GOES_BACK else ""
     return _Sentence(_digits(event.values)).vformat(text, (), values) + end
 
 

@@ -55,7 +55,7 @@ def _value(text: str) -> Value:
     return value if isinstance(value, str | float | int) else text
 
 
-def with_refused(status: NodeStatus, code: Code, refusals: Mapping[str, str]) -> NodeStatus:
+def with_refused(status: NodeStatus, refusals: Mapping[str, str], code: Code = Code.REFUSED) -> NodeStatus:
     """A status with what is wrong with messages before the node has them: why, by topic; none leaves it as it is.
 
     Parameters

@@ -24,7 +24,7 @@ from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.thresholds import LIVE
 from wam_ros.client import run_next_to
-from wam_ros.messages import Refused, message_type, read_status, read_trajectory
+from wam_ros.messages import Refused, WrongNames, message_type, read_status, read_trajectory
 from wam_ros.ros_topics import qos
 
 ACTION: Final = "follow_joint_trajectory"
@@ -94,8 +94,8 @@ class TrajectoryActionNode(Node):
             )
             _require_joints_alone(goal)
         except Refused as refusal:
-            is_of_names = "name '" in str(refusal)
-            return GoalEnd(GoalCode.INVALID_JOINTS if is_of_names else GoalCode.INVALID_GOAL, str(refusal))
+            code = GoalCode.INVALID_JOINTS if isinstance(refusal, WrongNames) else GoalCode.INVALID_GOAL
+            return GoalEnd(code, str(refusal))
         if Time.from_msg(goal.trajectory.header.stamp).nanoseconds > self._stamp > 0:
             return GoalEnd(GoalCode.INVALID_GOAL, "header.stamp is in the future; send 0, the arm starts at once")
         self._end(GoalEnd(GoalCode.INVALID_GOAL, "a newer goal took its place"))
@@ -110,7 +110,7 @@ class TrajectoryActionNode(Node):
     def _tolerances(self, tolerances: Sequence[Any]) -> dict[str, JointTolerance]:
         for one in tolerances:
             if one.name not in self._names:
-                raise Refused(f"unknown name '{one.name}' of a tolerance; allowed: {', '.join(self._names)}")
+                raise WrongNames(f"unknown name '{one.name}' of a tolerance; allowed: {', '.join(self._names)}")
             if one.acceleration > 0.0:
                 raise Refused(f"the tolerance of {one.name} names an acceleration, which is not measured; send 0")
         return {one.name: JointTolerance(one.position, one.velocity) for one in tolerances}

@@ -96,7 +96,7 @@ class Health:
         self.plain = status
         for code, refusals in self._defects.items():
             stated = {topic: one.stated for topic, one in refusals.items() if one.stated}
-            status = with_refused(status, code, stated)
+            status = with_refused(status, stated, code)
         if self.problems and not status.mode:
             events = (*status.events, *self.problems.values())
             status = status._replace(level=Level.ERROR, message=self.problem, fault=self.problem, events=events)

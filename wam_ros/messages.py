@@ -35,6 +35,10 @@ class Refused(ValueError):
         self.is_late = is_late
 
 
+class WrongNames(Refused):
+    """Names that are not those of the arm's joints or motors, each once."""
+
+
 def reader(topic: Topic, arm: Arm) -> Read:
     """What turns messages of a topic into values, or refuses them; only of a trajectory are the numbers looked at.
 
@@ -78,12 +82,12 @@ def _joint_state(message: JointState, names: Sequence[str]) -> State:
 def _order(found: Sequence[str], names: Sequence[str]) -> list[int]:
     for name in found:
         if name not in names:
-            raise Refused(f"unknown name '{name}'; allowed: {', '.join(names)}")
+            raise WrongNames(f"unknown name '{name}'; allowed: {', '.join(names)}")
         if found.count(name) > 1:
-            raise Refused(f"name '{name}' is given twice; send each of {', '.join(names)} once")
+            raise WrongNames(f"name '{name}' is given twice; send each of {', '.join(names)} once")
     for name in names:
         if name not in found:
-            raise Refused(f"name '{name}' is missing; send all of {', '.join(names)}")
+            raise WrongNames(f"name '{name}' is missing; send all of {', '.join(names)}")
     return [found.index(name) for name in names]
 
 

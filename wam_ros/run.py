@@ -218,7 +218,7 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     except RuntimeError as error:  # also security that is enforced where the middleware has none
-        reason = str(error).split(", at /")[0]
+        reason = " ".join(str(error).split())
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
     nodes = connection.nodes
 

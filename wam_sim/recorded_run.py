@@ -11,7 +11,7 @@ import numpy as np
 from wam_bag.arrays import Mask, Times
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_control.task.scenario import FORCE_LOOP
-from wam_description.event import Code, Event, Level
+from wam_description.event import Code
 from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, ENABLED, parse
 from wam_description.topics import TOPICS
@@ -142,9 +142,10 @@ class RecordedRun(NamedTuple):
         """
         found = self.stamped_statuses()
         loop = [(stamp, status.events) for stamp, status in found if status.node == FORCE_LOOP]
-        driver = [(stamp, status.fault) for stamp, status in found if status.node == "driver"]
         faults = [
-            (stamp, [Event(Code.FAULT, Level.ERROR, {"reason": fault})] if fault else []) for stamp, fault in driver
+            (stamp, [one for one in status.events if one.code is Code.FAULT])
+            for stamp, status in found
+            if status.node == "driver"
         ]
         own = lasting(loop, end)
         braked = self.braked(np.array([one.begin for one in own], np.int64))

@@ -12,8 +12,27 @@ PARTING = {"startswith", "endswith", "split", "rsplit", "partition", "rpartition
 REGULAR = {"search", "match", "fullmatch", "findall", "finditer", "split", "sub"}
 
 
-def is_text(node: ast.AST) -> bool:
-    return isinstance(node, ast.Attribute) and node.attr in TEXTS
+def texts(tree: ast.AST) -> set[ast.AST]:
+    """Expressions that are texts: attributes, str() of an exception that was caught, and names of either."""
+    functions = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef)]
+    found = {one for one in ast.walk(tree) if isinstance(one, ast.Attribute) and one.attr in TEXTS}
+    for function in functions or [tree]:
+        inside = list(ast.walk(function))
+        caught = {one.name for one in inside if isinstance(one, ast.ExceptHandler)}
+        found |= {one for one in inside if isinstance(one, ast.Call) and is_str_of(one, caught)}
+        given = [one for one in inside if isinstance(one, ast.Assign | ast.NamedExpr) and one.value in found]
+        names = {to.id for one in given for to in ast.walk(one) if isinstance(to, ast.Name) and is_set(to)}
+        found |= {one for one in inside if isinstance(one, ast.Name) and one.id in names and not is_set(one)}
+    return found
+
+
+def is_set(node: ast.Name) -> bool:
+    return isinstance(node.ctx, ast.Store)
+
+
+def is_str_of(call: ast.Call, caught: set[str | None]) -> bool:
+    names = {one.id for one in [call.func, *call.args] if isinstance(one, ast.Name)}
+    return "str" in names and bool(names & caught)
 
 
 def is_word(node: ast.AST) -> bool:
@@ -25,7 +44,9 @@ def is_word(node: ast.AST) -> bool:
 
 def readings(source: str) -> Iterator[int]:
     """Lines on which a text made for people is compared, searched or taken apart."""
-    for node in ast.walk(ast.parse(source)):
+    tree = ast.parse(source)
+    is_text = texts(tree).__contains__
+    for node in ast.walk(tree):
         if isinstance(node, ast.Compare):
             operands = [node.left, *node.comparators]
             searches = [type(one) in (ast.In, ast.NotIn) for one in node.ops]
@@ -33,7 +54,8 @@ def readings(source: str) -> Iterator[int]:
             if searched or (any(map(is_text, operands)) and any(map(is_word, operands))):
                 yield node.lineno
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            parted = node.func.attr in PARTING and is_text(node.func.value)
+            words = any(not isinstance(one, ast.Constant) or str(one.value).strip() for one in node.args)
+            parted = node.func.attr in PARTING and words and is_text(node.func.value)
             if parted or (node.func.attr in REGULAR and any(map(is_text, node.args))):
                 yield node.lineno
 
@@ -47,13 +69,18 @@ def readings(source: str) -> Iterator[int]:
         "one.reason.partition(';')",
         "re.search('x', answer.message)",
         "NUMBERS.sub('', why.reason)",
+        "def f():\n try: g()\n except ValueError as error: return 'name' in str(error)",
+        "def f(status):\n text = status.message\n return text.split(';')",
     ],
 )
 def test_a_reading_of_a_text_is_found(source: str) -> None:
-    assert list(readings(source)) == [1]
+    assert list(readings(source)) == [len(source.splitlines())]
 
 
-@pytest.mark.parametrize("source", ["not status.fault", "columns.message == at", "status.message == before.message"])
+@pytest.mark.parametrize(
+    "source",
+    ["not status.fault", "columns.message == at", "status.message == before.message", "status.message.split()"],
+)
 def test_what_does_not_read_the_words_is_not(source: str) -> None:
     assert not list(readings(source))
 

@@ -242,5 +242,5 @@ def _ratios(name: str, trials: Sequence[ForceTrial]) -> Panel:
     for end in TaskEnd:
         own = [one for one in trials if one.result.outcome is end][:FEW]
         ratio = np.clip([one.result.mean / one.task.force for one in own], LEAST, MOST)
-        lines.append((end.value.partition(":")[0], measured([one.task.force for one in own], ratio)))
+        lines.append((end.value, measured([one.task.force for one in own], ratio)))
     return Panel(name, "commanded force [N]", "true force at the end / commanded [-]", lines, "xy")

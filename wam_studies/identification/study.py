@@ -197,21 +197,39 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
     def score(self, records: Sequence[IdentificationResult]) -> Scores:
         """Errors of all plants, errors by stated ones of each kind, and all of each kind as a table."""
         kinds = grouped(records, lambda one: one.kind)
-        every = chain.from_iterable(named(_rows(own), kind) for kind, own in kinds.items())
-        ratios = [row for row in every if "standard error, rms" in row.name]
+        ratios = chain.from_iterable(named(map(_ratio, _errors(own)), kind) for kind, own in kinds.items())
         return Scores([*_rows(records), *ratios], [by_group("By kind of plant", kinds, _rows)])
+
+
+class _Errors(NamedTuple):
+    """Errors of a kind of friction, and those that were stated."""
+
+    name: str
+    errors: Array
+    stated: Array
+
+
+def _errors(records: Sequence[IdentificationResult]) -> Iterator[_Errors]:
+    """Errors of friction, and of Coulomb friction alone."""
+    for name, kind in (("friction", "level"), ("Coulomb friction alone", "coulomb")):
+        yield _Errors(name, *(np.concatenate([getattr(one, f"{kind}{end}") for one in records]) for end in ("", "_sd")))
+
+
+def _ratio(one: _Errors) -> Row:
+    """Errors by stated ones."""
+    allowed = 1.0 / LIMITS.factor, LIMITS.factor
+    return Row(f"{one.name}, error / standard error, rms", _rms(one.errors / one.stated), required=allowed)
 
 
 def _rows(records: Sequence[IdentificationResult]) -> Iterator[Row]:
     """Errors of friction, of Coulomb friction alone and of gravity."""
-    for name, kind in (("friction", "level"), ("Coulomb friction alone", "coulomb")):
-        errors, stated = (np.concatenate([getattr(one, f"{kind}{end}") for one in records]) for end in ("", "_sd"))
-        ratios, largest = errors / stated, exact(float(np.abs(errors).max()), len(errors))
+    for one in _errors(records):
+        name, errors = one.name, one.errors
+        beyond, largest = np.abs(errors / one.stated) > 2.0, exact(float(np.abs(errors).max()), len(errors))
         yield percent(f"{name}, error, rms", _rms(errors))
         yield percent(f"{name}, largest error", largest, (0.0, LIMITS.required), (0.0, LIMITS.target))
-        allowed = 1.0 / LIMITS.factor, LIMITS.factor
-        yield Row(f"{name}, error / standard error, rms", _rms(ratios), required=allowed)
-        yield percent(f"{name}, beyond twice its standard error", share(int((np.abs(ratios) > 2.0).sum()), len(ratios)))
+        yield _ratio(one)
+        yield percent(f"{name}, beyond twice its standard error", share(int(beyond.sum()), len(errors)))
     yield percent("friction error before, rms", _rms(np.concatenate([one.before for one in records])))
     yield Row("gravity error, rms", _rms(np.array([one.gravity for one in records])), "N m")
     yield Row("gravity error before, rms", _rms(np.array([one.gravity_before for one in records])), "N m")
