@@ -1,6 +1,7 @@
 """The adapter that makes a ROS node from a declared one (`wam_description.wiring`)."""
 
 import importlib
+import os
 import re
 import sys
 import time
@@ -9,7 +10,6 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import pairwise, takewhile
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -304,11 +304,14 @@ def main() -> None:
 
 @contextmanager
 def parameter_file(configuration: Configuration) -> Iterator[Path]:
-    """The values of a configuration as a file that ROS reads, as long as the context lasts."""
-    with TemporaryDirectory(prefix="wam_stack_") as folder:
-        file = Path(folder) / "parameters.yaml"
-        file.write_text(configuration.text, encoding="utf-8")
-        yield file
+    """The values of a configuration as a file that ROS reads, as long as the context lasts.
+
+    It is in memory, so that nothing is left of a process that is killed.
+    """
+    with os.fdopen(os.memfd_create("parameters"), "w", encoding="utf-8") as file:
+        file.write(configuration.text)
+        file.flush()
+        yield Path(f"/proc/{os.getpid()}/fd/{file.fileno()}")
 
 
 def named_file(given: str, before: str, files: ExitStack) -> str:

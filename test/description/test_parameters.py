@@ -139,6 +139,7 @@ def test_every_node_starts_with_its_section_of_a_configuration(path: Path, name:
         configuration = on_bus(configuration, "simulated:200")
     listed = {declared(entry).name: entry for entry in configuration.shared.nodes}
     with parameter_file(configuration) as file:  # ROS does not know overlays
+        assert Path("/proc") in file.parents  # nothing is left of a process that is killed
         node = make(ros, listed.get(name, name), file)
     for key, value in {**configuration.sections["/**"], **configuration.sections[name]}.items():
         there = node.get_parameter(key).value
@@ -320,7 +321,7 @@ def test_a_wrong_parameter_stops_the_process_with_its_name(
     assert good.count(right) == 1
     file.write_text(good.replace(right, wrong))
     done = run_node(name, "--ros-args", "--params-file", str(file))
-    assert f"node '{name}': " in done.stderr
+    assert f"node '{name}', section '" in done.stderr
     assert done.returncode == 1
     assert text in done.stderr
     assert "Traceback" not in done.stdout + done.stderr

@@ -202,20 +202,14 @@ def test_a_state_that_comes_twice_starts_one_step() -> None:
     assert list(synchroniser.put("state", 1_000_000, "b")) == []
 
 
-def test_an_outer_step_takes_states_of_outer_periods_only() -> None:
-    synchroniser = Synchroniser(TIMING, "state", {"sensors": InputSpec(outer=False)}, outer=True, thinned=True)
+@pytest.mark.parametrize(("delay", "taken"), [(0, {1: 1, 6: 6, 11: 11}), (1, {1: None, 6: 1, 11: 6})])
+def test_an_outer_step_takes_states_and_inputs_of_outer_periods_only(delay: int, taken: dict[int, int | None]) -> None:
+    spec = InputSpec(outer=False, delay=delay)
+    synchroniser = Synchroniser(TIMING, "state", {"sensors": spec}, outer=True, thinned=True)
     for tick in range(1, 12):
         synchroniser.put("sensors", tick * 1_000_000, tick)
         steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
-        assert steps == ([(tick * 1_000_000, tick)] if tick in (1, 6, 11) else [])
-
-
-def test_an_outer_step_takes_a_delayed_input_of_the_inner_rate_from_the_outer_period_before() -> None:
-    synchroniser = Synchroniser(TIMING, "state", {"sensors": InputSpec(outer=False, delay=1)}, outer=True, thinned=True)
-    for tick in range(1, 12):
-        synchroniser.put("sensors", tick * 1_000_000, tick)
-        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
-        assert steps == ([(tick * 1_000_000, {1: None, 6: 1, 11: 6}[tick])] if tick in (1, 6, 11) else [])
+        assert steps == ([(tick * 1_000_000, taken[tick])] if tick in taken else [])
 
 
 def test_an_outer_step_waits_for_its_inputs_of_both_rates_and_leaves_out_what_one_of_them_has_missed() -> None:

@@ -184,46 +184,6 @@ def bad(names: list[str] = MOTORS, effort: list[float] | None = None, ahead: int
     return lambda stamp: joint_state(stamp + ahead, names, State([], [], values))
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        bad(effort=[3.0, math.nan, 3.0, 3.0]),
-        bad(names=MOTORS[:3], effort=[3.0] * 3),
-    ],
-    ids=["nan", "missing"],
-)
-def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: Any, hand: Hand) -> None:
-    heard = Listener(hand.ros, "/diagnostics")
-    hand.enable()
-    hand.extra = [message] * 5
-    refusals = hand.node.health.refusals
-    hand.ros.wait(lambda: refusals["motor_current_command"].count == 5, what="refusals")
-    hand.wait_periods(5)
-    assert hand.driver.safety.mode is Mode.ENABLED
-    flowing = [sample.actual for sample in hand.driver.recent]
-    assert all(currents in (HOLDING, [0.0] * 4) for currents in flowing)
-    reports, key = heard.seen["/diagnostics"], "refused on motor_current_command"
-    hand.ros.wait(lambda: any(counted(report, key) == "5" for report in reports))
-    assert reports[-1].status[0].level == DiagnosticStatus.WARN
-
-
-def test_a_command_that_answers_no_state_is_refused_in_realtime(live: Hand) -> None:
-    live.enable()
-    live.is_answering = False
-    stamps = [0, -5 * MS, live.driver.stamp + 10_000 * MS]
-    refused = live.node.health.refusals
-    while (count := refused["motor_current_command"].count) < 3:
-        live.publisher.publish(joint_state(stamps[count], MOTORS, State([], [], [3.0] * 4)))
-        live.wait_periods(1)
-    live.wait_periods(60)
-    assert "command stale" in live.driver.safety.fault, "it does not feed the watchdog"
-    assert all(sample.actual in (HOLDING, [0.0] * 4) for sample in live.driver.recent)
-
-
-def counted(message: Any, key: str) -> str | None:
-    return next((pair.value for pair in message.status[0].values if pair.key == key), None)
-
-
 def test_two_publishers_of_the_command_are_a_fault_and_the_second_never_reaches_the_motors(live: Hand) -> None:
     heard = Listener(live.ros, "status")
     live.enable()
