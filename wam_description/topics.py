@@ -346,7 +346,7 @@ TOPICS: Final = (
         TABLE,
         "outer",
         "truth: one row per free body, door and moving obstacle, if there are any; frame base; float64 "
-        "columns: see docs/tasks.md",
+        "columns: see below",
         columns=ObjectState._fields,
         is_viewed=True,
     ),
