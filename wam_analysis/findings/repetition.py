@@ -83,11 +83,13 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
 def spectrum_section(recording: AnalysedRecording) -> Section:
     """The strongest lines of each joint and wrench axis, in its longest stretch without a gap."""
     findings, begins = [], []
+    varied: dict[str, tuple[float, str]] = {}  # the largest range of each unit, and whose it is
     for one, quantity, label in traced(recording.states):
         if (piece := longest(pieces(one, quantity))) is None:
             continue
         begins.append(CYCLE.first_line / float(np.ptp(piece.time)))
         unit = one.units[quantity]
+        varied[unit] = max(varied.get(unit, (0.0, "")), (float(np.ptp(piece.values[quantity])), label))
         for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines):
             amplitude = amplitude_at(piece.stamps, piece.recorded[quantity], line.frequency)
             if 2.0 * amplitude > LEAST.get(unit, 0.0):
@@ -98,7 +100,8 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
     span = f"Below {least} nothing was looked for: the longest part without a gap has fewer than five such cycles."
-    silent = [] if findings else [f"No vibration above {least}: only noise."]
+    ranges = ", ".join(f"{label} varied by {shown(size, unit)}" for unit, (size, label) in varied.items())
+    silent = [] if findings else [f"No vibration above {least}; slower motion was not looked for; {ranges}."]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 
