@@ -1,5 +1,6 @@
 """The program of a node: `python3 -m wam_ros.program NAME`; it ends quietly where its imports are interrupted."""
 
+from wam_description.nodes import installation
 from wam_ros.process_signals import end_at_once_on_signals, ignore_signals
 
 
@@ -12,8 +13,8 @@ def main() -> None:
         run_node()
     except ModuleNotFoundError as error:
         raise SystemExit(
-            f"error: the Python package '{error.name}' is missing; install it (pinocchio is 'pin' for pip), or put its "
-            "folder on PYTHONPATH: see docs/tutorial.md"
+            f"error: the Python package '{error.name}' is missing; {installation(error.name or '')}, or put its folder on "
+            "PYTHONPATH: see docs/tutorial.md"
         ) from None
     finally:
         ignore_signals()
