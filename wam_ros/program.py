@@ -13,8 +13,8 @@ def main() -> None:
         run_node()
     except ModuleNotFoundError as error:
         raise SystemExit(
-            f"error: the Python package '{error.name}' is missing; {installation(error.name or '')}, or put its folder on "
-            "PYTHONPATH: see docs/tutorial.md"
+            f"error: the Python package '{error.name}' is missing; {installation(error.name or '')}, or put its folder "
+            "on PYTHONPATH: see docs/tutorial.md"
         ) from None
     finally:
         ignore_signals()

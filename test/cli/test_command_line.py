@@ -122,8 +122,7 @@ def test_a_package_that_is_missing_is_named_in_one_sentence(
     monkeypatch.setattr(importlib, "import_module", without)
     code, out, err = said(capsys, "call", "enable")
     assert (code, out) == (1, "")
-    name = module.partition(".")[0]
-    assert err == f"wam call: it needs '{name}', which is not installed; install it with: {way}\n"
+    assert err == f"wam call: it needs '{module.partition('.')[0]}', which is not installed; install it with: {way}\n"
 
 
 def test_the_extras_are_those_of_the_package() -> None:

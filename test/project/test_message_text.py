@@ -14,9 +14,8 @@ REGULAR = {"search", "match", "fullmatch", "findall", "finditer", "split", "sub"
 
 def texts(tree: ast.AST) -> set[ast.AST]:
     """Expressions that are texts: attributes, str() of an exception that was caught, and names of either."""
-    functions = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef)]
     found = {one for one in ast.walk(tree) if isinstance(one, ast.Attribute) and one.attr in TEXTS}
-    for function in functions or [tree]:
+    for function in [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef)] or [tree]:
         inside = list(ast.walk(function))
         caught = {one.name for one in inside if isinstance(one, ast.ExceptHandler)}
         found |= {one for one in inside if isinstance(one, ast.Call) and is_str_of(one, caught)}

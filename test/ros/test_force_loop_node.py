@@ -133,7 +133,6 @@ def test_a_trajectory_that_is_refused_is_in_the_status_until_it_ends(ros: Any, t
         ("joint_posture_command", lambda stamp: joint_state(stamp, NAMES, State([0.0] * 3, [], [])), "has 3 values"),
         ("joint_posture_command", lambda stamp: joint_state(stamp, [], State([0.0] * 4, [], [])), "is missing"),
     ],
-    ids=["frame", "positions", "names"],
 )
 def test_the_status_names_a_malformed_command_until_none_comes_any_more(
     topic: str, message: Callable[[int], Any], reason: str, ros: Any, tmp_path: Path

@@ -116,13 +116,12 @@ def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_takes_its_t
 
 
 def test_a_command_without_a_stamp_counts_as_now_and_the_status_says_so(arm: RunningArm) -> None:
-    """Nobody can see how late it is."""
     arm.start(nodes=INNER)
     arm.enable()
     topic = "joint_velocity_command"
-    encode = encoder(BY_NAME[topic], arm.configuration.shared)
+    encode, sender = encoder(BY_NAME[topic], arm.configuration.shared), arm.publisher(topic)
     for speed in (0.1, 0.2) * 40:  # two in a period: the newest counts
-        arm.publisher(topic).publish(encode(0, arm.value(topic, velocity=[0.0, 0.0, speed, 0.0])))
+        sender.publish(encode(0, arm.value(topic, velocity=[0.0, 0.0, speed, 0.0])))
         if speed > 0.1:
             arm.run(0.005)
     assert arm.truth.qd[2] > 0.15
