@@ -117,7 +117,7 @@ def one_joint(ratio: float = 14.0, cable: float = 8.33) -> Arm:
     )
 
 
-def natural_frequencies(jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
+def eigenvalues(jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
     """Natural frequencies, rad/s, of rotor and link as two masses on two springs."""
     stiffness = np.array([[ktr, -n * ktr], [-n * ktr, n * n * ktr + kc]])
     scale = np.diag([jm**-0.5, jl**-0.5])

@@ -16,10 +16,10 @@ from arms import (
     NOWHERE,
     WAM,
     changed,
+    eigenvalues,
     frictionless,
     ideal_mjcf,
     ideal_plant,
-    natural_frequencies,
     one_joint,
 )
 from contact_truth import cover_frame, frame, joint_torques, motor_from_joint, torques
@@ -115,7 +115,7 @@ def test_both_resonances_of_a_joint_of_the_arm_are_those_of_4_4(
     )
     ratio = {0: 29.97, 3: 19.15}[joint] * ratio_scale
     inertia = float(BODY.mass_matrix(start)[joint, joint]) + WAM.joints.armature[joint]
-    expected = natural_frequencies(4.06745e-5, inertia, cable_stiffness(WAM, joint), stiffness, ratio)
+    expected = eigenvalues(4.06745e-5, inertia, cable_stiffness(WAM, joint), stiffness, ratio)
     plant = released(arm, spring(arm, joint, stiffness), FINE)
     found = tones(ring(plant, joint, ratio, FINE, 4), 5e-4)
     np.testing.assert_allclose(found, expected, rtol=3e-3)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from arms import natural_frequencies
+from arms import eigenvalues
 
 from wam_theory import resonance
 from wam_theory.cable import stiffness_with_reducer
@@ -18,7 +18,7 @@ def test_resonances_are_the_eigenvalues_of_the_two_masses() -> None:
     for _ in range(200):
         jm, jl, ktr, kc, n = np.array([4e-5, 0.4, 10.0, 1e3, 15.0]) * 10.0 ** rng.uniform(-1, 1, 5)
         lower, upper = force_resonances(jm, jl, ktr, kc, n)
-        np.testing.assert_allclose([lower, upper], natural_frequencies(jm, jl, ktr, kc, n), rtol=1e-6)
+        np.testing.assert_allclose([lower, upper], eigenvalues(jm, jl, ktr, kc, n), rtol=1e-6)
 
 
 def test_soft_contact_keeps_its_digits() -> None:
@@ -73,25 +73,21 @@ def test_reducer_at_the_joint_gives_root_n_at_constant_stress_and_n_for_equal_li
 
 
 # ---------------------------------------------------------------------------------------- limits
-def test_limits_are_those_of_the_natural_frequencies() -> None:
+def test_limits_are_those_of_the_eigenvalues() -> None:
     assert resonance.soft_contact_bandwidth(JM, JL, 1e-7, N) == pytest.approx(
         math.sqrt(1e-7 / (JL + N * N * JM)), rel=1e-12
     )
     assert resonance.soft_contact_bandwidth(JM, JL, 1e-3, N) == pytest.approx(
-        natural_frequencies(JM, JL, KTR, 1e-3, N)[0], rel=1e-4
+        eigenvalues(JM, JL, KTR, 1e-3, N)[0], rel=1e-4
     )
-    assert resonance.hard_contact_bandwidth(JM, KTR) == pytest.approx(
-        natural_frequencies(JM, JL, KTR, 1e9, N)[0], rel=1e-5
-    )
+    assert resonance.hard_contact_bandwidth(JM, KTR) == pytest.approx(eigenvalues(JM, JL, KTR, 1e9, N)[0], rel=1e-5)
     small = resonance.small_ratio_resonances(JM, JL, KTR, KC)
-    assert sorted(map(float, small)) == pytest.approx(natural_frequencies(JM, JL, KTR, KC, 1e-4).tolist(), rel=1e-6)
-    assert resonance.large_ratio_bandwidth(JM, KC, 1e4) == pytest.approx(
-        natural_frequencies(JM, JL, KTR, KC, 1e4)[0], rel=1e-4
-    )
+    assert sorted(map(float, small)) == pytest.approx(eigenvalues(JM, JL, KTR, KC, 1e-4).tolist(), rel=1e-6)
+    assert resonance.large_ratio_bandwidth(JM, KC, 1e4) == pytest.approx(eigenvalues(JM, JL, KTR, KC, 1e4)[0], rel=1e-4)
     for kc, lower in ((400.0, "link_on_contact"), (4e4, "rotor_on_cable")):  # (4.7) has its corner at 3150
         curves = resonance.small_ratio_resonances(JM, JL, KTR, kc)
         assert getattr(curves, lower) == min(curves)
-        assert min(curves) == pytest.approx(natural_frequencies(JM, JL, KTR, kc, 1e-4)[0], rel=1e-5)
+        assert min(curves) == pytest.approx(eigenvalues(JM, JL, KTR, kc, 1e-4)[0], rel=1e-5)
 
 
 # -------------------------------------------------------------------------------- best stiffness
@@ -105,7 +101,7 @@ def test_best_contact_stiffness_of_the_testbed_is_638_pounds_an_inch() -> None:
     assert best == pytest.approx(8.27e5, abs=500)
     assert best / 36.0**2 == pytest.approx(638, abs=0.5)
     asymptote = math.sqrt(INCHES["transmission_stiffness"] / INCHES["motor_inertia"])
-    at_nine = natural_frequencies(*(INCHES[k] for k in INCHES), 9e5, 14.0)[0] / asymptote
+    at_nine = eigenvalues(*(INCHES[k] for k in INCHES), 9e5, 14.0)[0] / asymptote
     assert at_nine == pytest.approx(0.954, abs=5e-4)
     assert resonance.best_transmission_stiffness(INCHES["motor_inertia"], 4.0, best) == pytest.approx(
         INCHES["transmission_stiffness"]
