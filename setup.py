@@ -157,7 +157,7 @@ setup(
     ],
     extras_require={
         # the arm of Barrett Technology on its CAN bus
-        "bus": ["python-can"],
+        "bus": ["msgpack", "python-can"],  # the first is for `udp_multicast`
         # the inner loop as C: WAM_COMPILE
         "compile": ["mypy", "setuptools<80"],
         # Tab in the shell: `register-python-argcomplete wam`
@@ -178,6 +178,7 @@ setup(
             "colcon-common-extensions",
             "mcap-ros2-support",
             "distributed",
+            "msgpack",
             "mypy",
             "pytest<9",
             "pytest-xdist",

@@ -198,5 +198,5 @@ class Lockstep:
         """How fast time has passed, for people."""
         simulated, elapsed = self.pacer.passed
         if not elapsed:
-            return "the arm's time never passed"
+            return "no period was run"
         return f"{simulated:.1f} s of the arm in {elapsed:.1f} s: real-time factor {simulated / elapsed:.2f}"

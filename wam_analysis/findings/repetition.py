@@ -91,6 +91,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         unit = one.units[quantity]
         varied[unit] = max(varied.get(unit, (0.0, "")), (float(np.ptp(piece.values[quantity])), label))
         for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines):
+            begins.append(line.frequency)
             amplitude = amplitude_at(piece.stamps, piece.recorded[quantity], line.frequency)
             if 2.0 * amplitude > LEAST.get(unit, 0.0):
                 name = f"{label}, {shown(line.frequency, 'Hz')}"

@@ -104,7 +104,7 @@ def _posture_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     worst = max(errors, key=lambda name: errors[name])
     listed = missed or {worst: errors[worst]}
     result = VerdictResult.NO if missed else VerdictResult.YES
-    shown = ", ".join(f"{name} {error:.2g} rad" for name, error in listed.items())
+    shown = ", ".join(f"{error:.2g} rad in step {name}" for name, error in listed.items())
     return [VerdictAnswer(f"posture within {MOTION.arrived:g} rad", result, shown)]
 
 

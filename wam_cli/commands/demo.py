@@ -129,7 +129,7 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     if presses:
         who = "the force loop presses with" if "force_loop" in configuration.shared.nodes else "commanded forces:"
         print(f"  {who} {', '.join(f'{newtons:g}' for newtons in presses)} N")
-    print(f"  every topic is recorded in {bag}", flush=True)
+    print(f"  every topic will be recorded in {bag}", flush=True)
     return list(steps)
 
 
