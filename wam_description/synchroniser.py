@@ -14,7 +14,7 @@ Nothing is used that is from the future, too old, or from before the driver's se
   that wait for each other go on so, after one of them has missed a state.
 - A session that a status announces forgets nothing by itself, as anybody can send a status; its first state does.
 - What a program sends is no clock, also where it starts a step: it is compared with the states that start another
-  step of the node.  Without a stamp it has that of the newest state when it comes.
+  step of the node.  Without a stamp one that starts a step is refused; others have that of the newest state.
 - A command of a program counts while it is streamed: a message of its own, which no other has preceded within
   the limit, does nothing.
 """
@@ -256,12 +256,11 @@ class Synchroniser:
         """The inlet of a trigger that a program sends."""
 
         def take(stamp: int, value: Any) -> Sequence[Inputs]:
+            if not stamp:
+                raise OutOfTime(f"no stamp, which a command has to have that starts a step; {CURE}")
             if clock is None:
-                if not stamp:
-                    raise OutOfTime(f"no stamp, and no state starts a step of this node that could give it one; {CURE}")
                 return self._start(stamp, value)
             now = clock._last
-            stamp = stamp or now
             clock._require_near(stamp, started)
             if stamp < self._last:
                 if self._last <= now + started.limit_ns:
