@@ -4,7 +4,8 @@ For users:
 
 - `bag`: `read` makes numpy columns of a bag, or lists what is in it; `Bag`, `BagError`.
 - `losses`: what a bag lacks, from the records of the recorder and of repairs.
-- `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.
+- `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.  `bag_name`:
+  the name of one that nobody has named.
 - `repair`: `repair` writes files that are broken or were not closed again from what can be read.
 - `errors`: `BagError`, `RecordingError`, and what is raised within the package.
 - `printable`: text from outside without control characters, for terminals and logs.

@@ -7,6 +7,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from wam_bag.bag_name import dated
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.event import Level
 from wam_description.interface import Interface
@@ -38,7 +39,7 @@ class RecorderNode(TolerantNode):
         self._own_parameters = {**values(shared), **values(own)}
         self._arm = shared.arm.name
         self._required = own.required
-        name = own.name or f"{shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+        name = own.name or dated(shared.arm.name)
         try:
             self.bag = BagWriter(Path(own.directory) / name, Split(own.split_size, own.split_time))
         except RecordingError as error:

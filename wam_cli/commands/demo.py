@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wam_bag.bag_name import dated
 from wam_bag.errors import BagError
 from wam_cli.options import (
     configuration_of,
@@ -75,7 +76,7 @@ def run(given: argparse.Namespace) -> int:
     base = timed(configuration_of(given), given)
     if given.scenario:
         base = base.with_values({"scenario:script": given.scenario})
-    name = given.name or f"{task.name if task else 'demo'}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    name = given.name or dated(task.name if task else "demo")
     directory = recording_folder(base, name)
     bag = directory / name
     if task:

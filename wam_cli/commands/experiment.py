@@ -5,11 +5,11 @@ import contextlib
 import os
 import shutil
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from wam_analysis.table import markdown
+from wam_bag.bag_name import dated
 from wam_cli.options import PAGE, bounded, writable_directory
 from wam_ros.bring_up import Composition
 from wam_sim.batch import processes, results
@@ -97,7 +97,7 @@ def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) 
     """Where the bags of an experiment are."""
     if given.evaluate:
         return Path(given.evaluate if is_one else given.evaluate / experiment.name)
-    name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    name = given.name or dated(experiment.name)
     return Path(given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}"))
 
 

@@ -4,7 +4,6 @@ import argparse
 import os
 import shlex
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from wam_analysis.identification.overlay import HEADING as MODEL_HEADING
 from wam_analysis.identification.overlay import estimator_values, impossibility, model_values, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
+from wam_bag.bag_name import dated
 from wam_cli.options import (
     SEED,
     YAML_SUFFIXES,
@@ -155,7 +155,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     print(f"written: {given.excite}; on a real arm: {on_arm}", flush=True)
     if given.only_write:
         return None
-    bag = recording_folder(configuration, "") / f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    bag = recording_folder(configuration, "") / dated("identify")
     stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
     played = configuration.with_values({"timing.dither_cycle": 0})
     failure = record(

@@ -3,9 +3,9 @@
 import argparse
 import shlex
 import sys
-import time
 from pathlib import Path
 
+from wam_bag.bag_name import dated
 from wam_cli.commands.live import page_next_to
 from wam_cli.options import (
     configuration_of,
@@ -58,7 +58,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration.with_nodes(*extra)
     if given.record:
         own = configuration.sections["recorder"]
-        name = own["name"] or f"{configuration.shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+        name = own["name"] or dated(configuration.shared.arm.name)
         bag = Path(str(own["directory"])) / str(name)
         configuration = configuration.with_values({"recorder:name": name})
     if given.scenario:
