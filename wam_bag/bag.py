@@ -44,8 +44,6 @@ __all__ = [
     "TableColumns", "WrenchColumns", "read",
 ]  # fmt: skip
 
-NOT_READ = ", which is not read"  # ends the type of a topic in another encoding
-
 
 class _Topics(dict[str, Columns]):
     """Columns by topic; a topic that is not there is answered with those that are."""
@@ -58,9 +56,9 @@ class Bag(NamedTuple):
     """A bag in memory: columns by topic, attachments and metadata records by name.
 
     `types`, `counts`, the messages, and `first` and `last`, log times, ns, are of all that is in its files, also of
-    topics that were not selected; the counts are empty in a bag that did not come from files.  Of attachments of one
-    name it has the last one, and of parameters those of all nodes; the metadata 'recording' is the recorder's, see
-    docs/bags.md.
+    topics that were not selected; the counts are empty in a bag that did not come from files.  `unread` are topics in
+    encodings that are not read; their types name these.  Of attachments of one name it has the last one, and of
+    parameters those of all nodes; the metadata 'recording' is the recorder's, see docs/bags.md.
     """
 
     path: Path
@@ -71,6 +69,7 @@ class Bag(NamedTuple):
     counts: Mapping[str, int] = MappingProxyType({})
     first: int = 0
     last: int = 0
+    unread: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
         """Path and counts, not every array."""
@@ -157,7 +156,7 @@ def read(
             f"{path} is to be read from {begin_ns} ns to {end_ns} ns; the end must not be before the start"
         )
     collectors: dict[str, Collector] = {}
-    counts, types, times = Counter[str](), dict[str, str](), list[int]()
+    counts, types, times, unread = Counter[str](), dict[str, str](), list[int](), set[str]()
     attachments, metadata = dict[str, bytes](), dict[str, dict[str, str]]()
     for one in files(Path(path)):
         with opened(one) as file:
@@ -175,9 +174,11 @@ def read(
             for number, channel in file.channels.items():
                 counts[channel.topic] += listed.by_channel.get(number, 0)
                 schema = file.schemas.get(channel.schema_id)
-                is_read = channel.message_encoding in ENCODINGS
-                unread = "" if is_read else f" in {channel.message_encoding or 'no encoding'}{NOT_READ}"
-                types.setdefault(channel.topic, f"{full_name(schema.name) if schema else '?'}{unread}")
+                kind = full_name(schema.name) if schema else "?"
+                if channel.topic not in types and channel.message_encoding not in ENCODINGS:
+                    unread.add(channel.topic)
+                    kind += f" in {channel.message_encoding or 'no encoding'}, which is not read"
+                types.setdefault(channel.topic, kind)
                 if is_selected(channel.topic, topics):
                     take(channel)
             for item in file.attachments():
@@ -190,7 +191,9 @@ def read(
     columns = _Topics({t: one.columns(f"{path}, topic {t}") for t, one in sorted(collectors.items())})
     types |= {topic: one.kind.name for topic, one in collectors.items()}
     ends = min(times, default=0), max(times, default=0)
-    return Bag(Path(path), columns, dict(sorted(types.items())), attachments, metadata, counts, *ends)
+    return Bag(
+        Path(path), columns, dict(sorted(types.items())), attachments, metadata, counts, *ends, frozenset(unread)
+    )
 
 
 def _collector(

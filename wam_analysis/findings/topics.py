@@ -9,7 +9,7 @@ from wam_analysis.findings.finding import Section, counted, shown, times
 from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
-from wam_bag.bag import NOT_READ, Bag, Columns, JointColumns, WrenchColumns
+from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
 
 UNUSUAL = {  # values in the unit of ROS that few robots reach
@@ -150,6 +150,6 @@ def _unread(bag: Bag) -> list[str]:
     most = sorted(others, key=lambda name: -others[name])[: READING_LIMITS.named]
     listed = ", ".join(f"{name} ({bag.types.get(name, '')})" for name in most) + ", ..." * (len(others) > len(most))
     number = f"{sum(others.values())} messages of other topics"
-    readable = [name for name in most if not bag.types.get(name, "").endswith(NOT_READ)]
+    readable = [name for name in most if name not in bag.unread]
     advice = f"; --topic {readable[0]} --map QUANTITY=FIELD analyses them" if readable else ""
     return [f"{number} were not analysed: {listed}{advice}."]
