@@ -198,8 +198,8 @@ class Synchroniser:
         Raises
         ------
         OutOfTime
-            where the stamp differs from that of the newest state by more than the limit of the input, or where there is
-            none and the node knows no states.
+            where the stamp differs from that of the newest state by more than the limit of the input, or where a
+            command that starts a step has none.
         """
         return self._inlets[topic](stamp, value)
 

@@ -58,7 +58,7 @@ class Knowledge:
         return belief(axis, size, torques, own, run.is_touching, run.resting, run.shaking.swing(axis, own))
 
     def _among_links(self, q: Sequence[float], axis: CommandedAxis, known: Belief, contact: Contact) -> Belief:
-        """The same where it is not known which link is touched: the force on another one may be meant, too."""
+        """The same where it is not known which link is touched: the variance of the place is that of a mixture."""
         place, forces = axis.place, self._forces
         is_sure = not contact.cover or contact.probability >= self._own.link_probability_limit
         if place is None or place.is_pinned or place.is_known or is_sure:
