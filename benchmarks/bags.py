@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bench import Benchmark, Measured, Row
+from bench import Benchmark, Ratio, Values
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -26,7 +26,7 @@ def recorded(quick: bool) -> Iterator[Path]:
         configuration = Configuration.load(packaged("wam"))
         steps = scenario_steps(1.0 if quick else 20.0, configuration.shared)
         if failure := record(configuration, steps, Path(folder) / "bag"):
-            raise SystemExit(failure)
+            raise RuntimeError(failure)
         yield Path(folder) / "bag"
 
 
@@ -63,45 +63,42 @@ def cost(reader: Callable[[Path], int], bag: Path, times: int) -> tuple[float, i
     return (time.process_time() - begin) / times / count * 1e6, count
 
 
-def bag_reading(quick: bool) -> Measured:
+def bag_reading(quick: bool) -> Values:
     """Each message of the same bag by every reader."""
     readers = {"everything": (everything, 5), "columns": (columns_only, 5)}
     readers |= {"rosbags": (rosbags, 1), "mcap-ros2-support": (mcap_ros2, 1)}
     with recorded(quick) as bag:
-        while True:
-            found = {name: cost(reader, bag, times) for name, (reader, times) in readers.items()}
-            if len(counts := {count for _, count in found.values()}) != 1:
-                raise SystemExit(f"the readers found different numbers of messages: {counts}")
-
-            one = {name: each for name, (each, _) in found.items()}
-            yield one | {f"{name}, columns": each for name, each in one.items()}
+        found = {name: cost(reader, bag, times) for name, (reader, times) in readers.items()}
+    if len(counts := {count for _, count in found.values()}) != 1:
+        raise RuntimeError(f"the readers found different numbers of messages: {counts}")
+    one = {name: each for name, (each, _) in found.items()}
+    return one | {f"{name}, columns": each for name, each in one.items()}
 
 
 BAG_READING = Benchmark(
     bag_reading,
     "reading a message [us]",
     (
-        Row("rosbags", "everything"),
-        Row("mcap-ros2-support", "everything"),
-        Row("rosbags, columns", "columns", 25.0, 50.0),
-        Row("mcap-ros2-support, columns", "columns", 50.0, 100.0),
+        Ratio("rosbags", "everything"),
+        Ratio("mcap-ros2-support", "everything"),
+        Ratio("rosbags, columns", "columns", 25.0, 50.0),
+        Ratio("mcap-ros2-support, columns", "columns", 50.0, 100.0),
     ),
     rounds=5,
 )
 
 
-def analysis(quick: bool) -> Measured:
+def analysis(quick: bool) -> Values:
     """`wam analyse` of 20 s of all topics, in times real time."""
     length = 1.0 if quick else 20.0
+    kept: list = []
     with recorded(quick) as bag:
-        while True:
-            kept: list = []
-            times = {
-                "reading": seconds(lambda to=kept: to.append(read(bag, TOPICS_READ, may_lack=True))),
-                "findings": seconds(lambda to=kept: to.append(analyse_bag(to[0], lambda doing: None))),
-                "page": seconds(lambda to=kept: page(to[1])),
-            }
-            yield {name: length / taken for name, taken in times.items()}
+        times = {
+            "reading": seconds(lambda: kept.append(read(bag, TOPICS_READ, may_lack=True))),
+            "findings": seconds(lambda: kept.append(analyse_bag(kept[0], lambda doing: None))),
+            "page": seconds(lambda: page(kept[1])),
+        }
+    return {name: length / taken for name, taken in times.items()}
 
 
-ANALYSIS = Benchmark(analysis, "wam analyse, in times real time", tuple(map(Row, ("reading", "findings", "page"))), 5)
+ANALYSIS = Benchmark(analysis, "wam analyse, in times real time", tuple(map(Ratio, ("reading", "findings", "page"))), 5)

@@ -1,38 +1,43 @@
-"""Runs the benchmarks; each measures its subject and a reference in turns and prints their ratio.
+"""The benchmarks as a study: each round measures a subject and a reference in turns; only their ratio is compared.
 
-    python benchmarks/bench.py                 # all
-    python benchmarks/bench.py speed plant --rounds 3
+    python benchmarks/bench.py                                           # all
+    python benchmarks/bench.py --benchmarks speed compiled --rounds 3
 
 Speeds differ between computers, and on one computer from hour to hour; the ratio of two quantities measured in turns
-in the same run is stable.  Compare ratios only.
+in the same run is stable.
 """
 
-import argparse
-import importlib
-import json
 import math
-import os
-import platform
 import statistics
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from importlib.metadata import version
-from importlib.util import find_spec
-from itertools import islice
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import ClassVar, Final, NamedTuple
 
-import numpy as np
+from wam_cli.commands.evaluate import program
+from wam_description.parameters import parameter
+from wam_studies.figures.panels import Mark, Panel, measured
+from wam_studies.harness import Study
+from wam_studies.scores import ANY, NONE, Row, Scores, ScoreTable, exact, grouped
 
-from wam_analysis.table import plain
+# name: where it is
+BENCHMARKS: Final = {
+    "speed": "stack:SPEED",
+    "round_trip": "stack:ROUND_TRIP",
+    "real_time": "stack:REAL_TIME",
+    "bus": "bus:BUS",
+    "compiled": "simulation:COMPILED",
+    "parts": "cost:PARTS",
+    "estimator": "cost:ESTIMATOR",
+    "bag_reading": "bags:BAG_READING",
+    "analysis": "bags:ANALYSIS",
+}
+Values = Mapping[str, float]  # of a round, by name; without what cannot be measured here
 
-RESULTS = Path(__file__).resolve().parent / "results"
-Measured = Iterator[dict[str, float]]  # of each round, the values by their names
 
-
-class Row(NamedTuple):
+class Ratio(NamedTuple):
     """A row of a benchmark's table.
 
     Attributes
@@ -47,111 +52,136 @@ class Row(NamedTuple):
     must: float = math.nan
     aim: float = math.nan
 
+    def of(self, found: Values) -> float:
+        """The ratio in a round."""
+        return found[self.name] / found.get(self.reference, 1.0)
+
+    def row(self, benchmark: str, rounds: Sequence[Values]) -> Row:
+        """The median of the rounds, with what is required."""
+        ratios = [self.of(found) for found in rounds if self.name in found]
+        required, target = (ANY if math.isnan(end) else self._better(end) for end in (self.must, self.aim))
+        found = exact(statistics.median(ratios), len(ratios)) if ratios else NONE
+        return Row(f"{benchmark}: {self.name}", found, required=required, target=target)
+
+    def _better(self, end: float) -> tuple[float, float]:
+        return (end, math.inf) if self.aim > self.must else (0.0, end)
+
+    def cells(self, rounds: Sequence[Values]) -> list[str]:
+        """Medians of measured value and reference, and the ratio with its ends."""
+        shown = [found for found in rounds if self.name in found]
+        if not shown:
+            return [self.name, *["–"] * 3]
+        ratios = sorted(map(self.of, shown))
+        both = [statistics.median(found.get(name, 1.0) for found in shown) for name in (self.name, self.reference)]
+        middle = f"{statistics.median(ratios):.3g} ({ratios[0]:.3g} to {ratios[-1]:.3g})"
+        return [self.name, *(f"{value:.4g}" if self.reference else "" for value in both), middle]
+
 
 class Benchmark(NamedTuple):
     """What is measured, and what is shown of it.
 
     Attributes
     ----------
-    measure : yields the values of one round after the other, of a quick run or of another.
+    measure : the values of a round; a short one where its argument is true.
     title : of the table, with the unit of its values.
-    rows : of the table.
-    rounds : by default; a quick run has one.
+    ratios : the rows.
+    rounds : by default.
     """
 
-    measure: Callable[[bool], Measured]
+    measure: Callable[[bool], Values]
     title: str
-    rows: Sequence[Row]
+    ratios: Sequence[Ratio]
     rounds: int
-
-
-def mark(value: float, row: Row) -> str:
-    """Which of its two limits a row reaches."""
-    if math.isnan(row.must):
-        return ""
-    sign = 1.0 if row.aim > row.must else -1.0
-    limits = (("aim", row.aim), ("must", row.must))
-    reached = next((name for name, limit in limits if sign * value >= sign * limit), "below")
-    return f"{reached} [{row.must:g}, {row.aim:g}]"
-
-
-def machine() -> str:
-    """Description of this computer, in one line."""
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.is_file() else []
-    cpu = next((line.partition(":")[2].strip() for line in lines if "model name" in line), platform.machine())
-    loop = "inner loop as C" if find_spec("wam_driver.fast_steps") else "plain"
-    return f"{os.cpu_count()} cores, {cpu}, {platform.system()}, Python {platform.python_version()}, {loop}"
-
-
-def run(name: str, benchmark: Benchmark, rounds: int, quick: bool) -> None:
-    """Measure the rounds, print the table, keep the medians with their quartiles unless the run is quick."""
-    measuring = benchmark.measure(quick)
-    found = list(islice(measuring, rounds))
-    measuring.close()
-    lines, kept = [], {}
-    for row in benchmark.rows:
-        values = [one[row.name] for one in found]
-        references = [one.get(row.reference, 1.0) for one in found]
-        ratios = [a / b for a, b in zip(values, references, strict=True)]
-        low, median, high = np.quantile(ratios, (0.25, 0.5, 0.75)).tolist()
-        kept[row.name] = median, low, high
-        middle = [f"{statistics.median(part):.4g}" if row.reference else "" for part in (values, references)]
-        lines.append([row.name, *middle, row.reference, f"{median:.3g} ({low:.3g}..{high:.3g})", mark(median, row)])
-    head = [benchmark.title, "measured", "reference", "that is", "ratio, or value (middle half)", "[must, aim]"]
-    print(f"== {name}\n{machine()}")
-    print("\n".join(plain([head], lines, left=(0, 3, 5))), flush=True)
-    if not quick:
-        RESULTS.mkdir(exist_ok=True)
-        about = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "machine": machine(), "mujoco": version("mujoco")}
-        with (RESULTS / f"{name}.jsonl").open("a", encoding="utf-8") as file:
-            file.write(json.dumps({**about, "rounds": rounds, **kept}) + "\n")
-
-
-# name: where it is
-BENCHMARKS = {
-    "speed": "stack:SPEED",
-    "round_trip": "stack:ROUND_TRIP",
-    "real_time": "stack:REAL_TIME",
-    "bus": "bus:BUS",
-    "plant": "simulation:PLANT",
-    "compiled": "simulation:COMPILED",
-    "parts": "cost:PARTS",
-    "estimator": "cost:ESTIMATOR",
-    "bag_reading": "bags:BAG_READING",
-    "analysis": "bags:ANALYSIS",
-}
-
-
-PLAIN = ("plant",)  # of the tree, in plain Python
 
 
 def load(name: str) -> Benchmark:
     """The benchmark of a name."""
-    module, _, constant = BENCHMARKS[name].partition(":")
-    return getattr(importlib.import_module(module), constant)
+    found: Benchmark = resolve_name(BENCHMARKS[name])
+    return found
 
 
-def main() -> None:
-    """Run the benchmarks that are named, or all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help=", ".join(BENCHMARKS))
-    parser.add_argument("--rounds", type=int, help="number of measurements")
-    parser.add_argument("--quick", action="store_true", help="short test run; nothing is written")
-    given = parser.parse_args()
-    if unknown := [name for name in given.names if name not in BENCHMARKS]:
-        parser.error(f"there is no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
-    names = given.names or list(BENCHMARKS)
-    for name in names:
-        if len(names) > 1 or (name in PLAIN and not os.environ.get("PYTHONPATH")):  # each in a process of its own
-            words = [name, *["--quick"] * given.quick, *(["--rounds", str(given.rounds)] if given.rounds else [])]
-            tree = {"PYTHONPATH": str(RESULTS.parents[1])} if name in PLAIN else {}
-            subprocess.run([sys.executable, __file__, *words], env={**os.environ, **tree}, check=True)
-            continue
-        benchmark = load(name)
-        run(name, benchmark, given.rounds or (1 if given.quick else benchmark.rounds), given.quick)
+class Round(NamedTuple):
+    """A case: one round of a benchmark.
+
+    Attributes
+    ----------
+    begin : of the run, s since 1970: what was measured in another run is not taken.
+    """
+
+    benchmark: str
+    number: int
+    is_quick: bool
+    begin: float
+
+
+class Measured(NamedTuple):
+    """What a round of a benchmark has measured."""
+
+    benchmark: str
+    values: Values
+
+
+@dataclass(frozen=True)
+class BenchmarkStudy(Study[Round, Measured]):
+    """The rounds of each benchmark, one after the other."""
+
+    title: ClassVar[str] = "speed of the stack and of its parts"
+    page: ClassVar[str] = "benchmarks/README.md"
+    seeds: ClassVar[tuple[int, ...]] = (1,)
+    over_topics: ClassVar[bool] = True
+    benchmarks: tuple[str, ...] = parameter("benchmarks", choices=tuple(BENCHMARKS), default=tuple(BENCHMARKS))
+    rounds: int = parameter("rounds of each; 0 for as many as a benchmark has by itself", low=0, default=0)
+    quick: bool = parameter("one short round of each", default=False)
+
+    def cases(self, seed: int) -> Iterator[Round]:
+        """The rounds; nothing is drawn."""
+        begin = time.time()
+        for name in self.benchmarks:
+            for number in range(1 if self.quick else self.rounds or load(name).rounds):
+                yield Round(name, number, self.quick, begin)
+
+    @staticmethod
+    def run(case: Round) -> Measured:
+        """Measure one round."""
+        return Measured(case.benchmark, dict(load(case.benchmark).measure(case.is_quick)))
+
+    def score(self, records: Sequence[Measured]) -> Scores:
+        """The median of each ratio; a table of each benchmark."""
+        rows, tables = [], []
+        for name, own in grouped(records, lambda record: record.benchmark).items():
+            benchmark, rounds = load(name), [record.values for record in own]
+            rows += [ratio.row(name, rounds) for ratio in benchmark.ratios]
+            lines = [ratio.cells(rounds) for ratio in benchmark.ratios]
+            tables.append(ScoreTable(f"{name}: {benchmark.title}", HEAD, lines))
+        return Scores(rows, tables)
+
+    def panels(self, records: Sequence[Measured]) -> Sequence[Panel]:
+        """How the computing time grows from the bare plant to the stack in processes, and the parts of a period."""
+        of = grouped(records, lambda record: record.benchmark)
+        panels = []
+        if rounds := [record.values for record in of.get("speed", ())]:
+            names = ["bare plant", *(ratio.name for ratio in load("speed").ratios)]
+            times = {name: 1e3 / statistics.median(found[name] for found in rounds) for name in names}
+            panels.append(_named_points("What each layer adds", "computing time of 1 s of the arm [ms]", times))
+        if rounds := [record.values for record in of.get("parts", ())]:
+            times = {name: statistics.median(found[name] for found in rounds) for name in rounds[0]}
+            largest = dict(sorted(times.items(), key=lambda item: -item[1]))
+            panels.append(_named_points("Parts of a period, plain Python", "computing time [us]", largest))
+        return panels
+
+
+def _named_points(title: str, unit: str, values: Values) -> Panel:
+    """A panel with a named point of each value, the first at the top."""
+    places = range(0, -len(values), -1)
+    marks = tuple(map(Mark, values, values.values(), places))
+    line = ("", measured(list(values.values()), places))
+    room = 30.0 * max(values.values())  # for the names
+    return Panel(title, unit, "", [line], "x", marks, (math.nan, room, math.nan, math.nan))
+
+
+HEAD: Final = ("", "measured", "reference", "ratio, or value: median (least to greatest)")
 
 
 if __name__ == "__main__":
     sys.modules["bench"] = sys.modules["__main__"]
-    main()
+    sys.exit(program("bench", BenchmarkStudy))

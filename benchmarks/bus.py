@@ -5,7 +5,7 @@ from itertools import count
 from statistics import median
 
 import can
-from bench import Benchmark, Measured, Row
+from bench import Benchmark, Ratio, Values
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
@@ -93,7 +93,7 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
                 drain(arm)
             drain(host if loop is bare else arm)  # of the echo of the last torques
     if driver.trouble:
-        raise SystemExit(driver.trouble)
+        raise RuntimeError(driver.trouble)
     host.shutdown()
     arm.shutdown()
     return median(spent[0]) / POLL / 1e3, median(spent[1]) / POLL / 1e3
@@ -124,18 +124,17 @@ def late(seconds: float) -> float:
     return 100.0 * (all_missed - missed) / (all_missed - missed + all_steps - steps)
 
 
-def bus(quick: bool) -> Measured:
+def bus(quick: bool) -> Values:
     """A cycle of the driver and the bare loop, on a queue and on sockets; and the late cycles of its node."""
     chunks = 20 if quick else 200
-    while True:
-        queue, sockets = cost(chunks, "virtual", "cost"), cost(chunks, "udp_multicast", "239.74.163.48")
-        found = dict(zip((QUEUE, BARE_QUEUE, SOCKETS, BARE_SOCKETS), (*queue, *sockets), strict=True))
-        yield {**found, LATE: late(2.0 if quick else 10.0)}
+    queue, sockets = cost(chunks, "virtual", "cost"), cost(chunks, "udp_multicast", "239.74.163.48")
+    found = dict(zip((QUEUE, BARE_QUEUE, SOCKETS, BARE_SOCKETS), (*queue, *sockets), strict=True))
+    return {**found, LATE: late(2.0 if quick else 10.0)}
 
 
 BUS = Benchmark(
     bus,
     "a cycle of a real arm's driver [us]",
-    (Row(QUEUE, BARE_QUEUE, 2.0, 1.5), Row(SOCKETS, BARE_SOCKETS, 2.0, 1.5), Row(LATE, "", 1.0, 0.3)),
+    (Ratio(QUEUE, BARE_QUEUE, 2.0, 1.5), Ratio(SOCKETS, BARE_SOCKETS, 2.0, 1.5), Ratio(LATE, "", 1.0, 0.3)),
     rounds=5,
 )

@@ -17,7 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import yaml
-from bench import Benchmark, Measured, Row
+from bench import Benchmark, Ratio, Values
 
 from wam_control.task.scenario import ScenarioStep, load
 from wam_description.arm import Shared
@@ -142,35 +142,10 @@ CASES = {
 }
 
 
-def plant(quick: bool) -> Measured:
-    """A substep of the plant, and a bare mj_step of the same model from the same state."""
-    cases = {name: make() for name, make in CASES.items()}
-    if not cases["in contact"].plant.data.ncon:
-        raise SystemExit("the box is not touched: give another pose in contact")
-    while True:
-        found = {name: case.measure() for name, case in cases.items()}
-        bare = {BARE + name: both[1] for name, both in found.items()}
-        yield {**bare, **{name: both[0] for name, both in found.items()}}
-
-
-BARE = "mj_step, "
-PLANT = Benchmark(
-    plant,
-    "a substep of the plant [us]",
-    (
-        Row("arm free, moving", BARE + "arm free, moving", 1.38, 1.3),
-        Row("arm free, pushed", BARE + "arm free, pushed", 1.75, 1.3),
-        Row("arm, every effect on", BARE + "arm, every effect on"),
-        Row("in contact", BARE + "in contact", 1.5, 1.3),
-        Row("testbed, moving", BARE + "testbed, moving", 1.5, 1.3),
-    ),
-    rounds=200,
-)
-
-
 # the inner loop as C
 
 DIRECT, OVER, AS_PYTHON = "run without ROS, times real time", "substep over mj_step, ", ", plain Python"
+GAIN = "gain"
 
 
 def installed() -> Path | None:
@@ -183,48 +158,52 @@ def installed() -> Path | None:
     return None if differing or missing else site
 
 
+def by_packages_of(tree: Path, module: str, length: float) -> dict[str, Any]:
+    """What a module of the benchmarks prints as JSON, by the packages of a tree, in a process of its own."""
+    here = os.pathsep.join([str(tree), str(Path(__file__).parent)])
+    command = [sys.executable, "-P", module, str(length)]
+    environment = {**os.environ, "PYTHONPATH": here}
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
 def measured_here(length: float) -> dict[str, Any]:
     """What the packages of this process take, and a hash of all numbers of the run."""
     configuration = Configuration.load(packaged("wam"))
     run = Simulation(configuration, scenario_steps(length, configuration.shared))
     begin = time.process_time()  # which other programs disturb less
     if failure := run.play():
-        raise SystemExit(failure)
+        raise RuntimeError(failure)
     found: dict[str, Any] = {DIRECT: run.driver.stamp / 1e9 / (time.process_time() - begin)}
     found["hash"] = hashlib.sha256(repr(sorted(run.rows.items())).encode()).hexdigest()
-    for name, make in CASES.items():
-        case = make()
+    cases = {name: make() for name, make in CASES.items()}
+    if not cases["in contact"].plant.data.ncon:
+        raise RuntimeError("the box is not touched: give another pose in contact")
+    for name, case in cases.items():
         found[OVER + name] = float(np.median([a / b for a, b in (case.measure() for _ in range(10))]))
     return found
 
 
-def compiled(quick: bool) -> Measured:
-    """The installed packages and the tree, in processes of their own; every number of their runs has the same bits."""
-    if (site := installed()) is None:
-        print("left out: this source is not installed as C; run make install")
-        raise SystemExit
-    while True:
-        found = []
-        for tree in (site, ROOT):
-            command = [sys.executable, "-P", __file__, str(1.0 if quick else 5.0)]
-            here = os.pathsep.join([str(tree), str(Path(__file__).parent)])
-            environment = {**os.environ, "PYTHONPATH": here}
-            done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
-            found.append(json.loads(done.stdout))
-        fast, slow = found
-        if fast.pop("hash") != slow.pop("hash"):
-            raise SystemExit("the numbers of the two runs differ")
-        yield {**fast, **{name + AS_PYTHON: value for name, value in slow.items()}, "gain": fast[DIRECT] / slow[DIRECT]}
+def compiled(quick: bool) -> Values:
+    """The tree, and the installed packages if they are its source as C; every number has the same bits in both."""
+    length = 1.0 if quick else 5.0
+    found = [by_packages_of(tree, __file__, length) for tree in (ROOT, installed()) if tree]
+    if len({one.pop("hash") for one in found}) > 1:
+        raise RuntimeError("the numbers of the two runs differ")
+    plain, *fast = found
+    values = {name + AS_PYTHON: value for name, value in plain.items()}
+    return {**values, **fast[0], GAIN: fast[0][DIRECT] / plain[DIRECT]} if fast else values
 
 
 COMPILED = Benchmark(
     compiled,
     "equal bits",
     (
-        Row(DIRECT, "", 20.0, 26.0),
-        Row(DIRECT + AS_PYTHON, "", 14.0, 18.0),
-        Row("gain"),
-        *(Row(OVER + name, "", 1.08, 1.03) for name in CASES),
+        Ratio(DIRECT, "", 20.0, 26.0),
+        Ratio(DIRECT + AS_PYTHON, "", 14.0, 18.0),
+        Ratio(GAIN),
+        *(Ratio(OVER + name, "", 1.08, 1.03) for name in CASES),
     ),
     rounds=10,
 )

@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import yaml
-from bench import Benchmark, Measured, Row
+from bench import Benchmark, Ratio, Values
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -91,7 +91,7 @@ def direct(configuration: Configuration, length: float) -> float:
     failures: list[str] = []
     taken = seconds(lambda: failures.append(run.play()))
     if failures != [""]:
-        raise SystemExit(failures[0])
+        raise RuntimeError(failures[0])
     return run.driver.stamp / 1e9 / taken
 
 
@@ -109,7 +109,7 @@ def lockstep(configuration: Configuration, *recorder: str) -> float:
 
         composition.spin(ended)
         if player.failure:
-            raise SystemExit(player.failure)
+            raise RuntimeError(player.failure)
     return seen_speed(seen)
 
 
@@ -123,9 +123,9 @@ def in_processes(configuration: Configuration, how: str) -> float:
         while not stack.ended():
             executor.spin_once(timeout_sec=0.1)
         if stack.failures:
-            raise SystemExit(stack.failures[0])
+            raise RuntimeError(stack.failures[0])
     if stack.bag_failure:
-        raise SystemExit(stack.bag_failure)
+        raise RuntimeError(stack.bag_failure)
     return seen_speed(seen)
 
 
@@ -137,7 +137,7 @@ def seen_speed(seen: Readings) -> float:
     return (stop - start) / 1e9 / (end - begin)
 
 
-def speed(quick: bool) -> Measured:
+def speed(quick: bool) -> Values:
     """Times real time of a short form of the demonstration: without ROS, over topics in one process, in several.
 
     What is required is of a computer on which the bare plant, MuJoCo's step of the same arm, makes `BARE` times real
@@ -149,28 +149,27 @@ def speed(quick: bool) -> Measured:
         script.write_text(yaml.safe_dump(scenario(length)), encoding="utf-8")
         values = {"timing.mode": "lockstep", "timing.real_time_factor": 0.0, "scenario:script": str(script)}
         base = Configuration.load(packaged("wam")).with_values({**values, "recorder:directory": folder})
-        while True:
-            turn = time.monotonic_ns()
-            named = [base.with_values({"recorder:name": f"{how}_{turn}"}) for how in ("one", GROUPED, EACH)]
-            yield {
-                FASTER: bare(base, 1.0 if quick else 20.0) / BARE,
-                "run without ROS": direct(base, length),
-                "lockstep": lockstep(base),
-                "lockstep, recorded": lockstep(named[0], "recorder"),
-                "grouped, recorded": in_processes(named[1], GROUPED),
-                "one process per node, recorded": in_processes(named[2], EACH),
-            }
+        named = [base.with_values({"recorder:name": how}) for how in ("one", GROUPED, EACH)]
+        found = {
+            "bare plant": bare(base, 1.0 if quick else 20.0),
+            "run without ROS": direct(base, length),
+            "lockstep": lockstep(base),
+            "lockstep, recorded": lockstep(named[0], "recorder"),
+            "grouped, recorded": in_processes(named[1], GROUPED),
+            "one process per node, recorded": in_processes(named[2], EACH),
+        }
+    return {**found, FASTER: found["bare plant"] / BARE}
 
 
 SPEED = Benchmark(
     speed,
     "times real time",
     (
-        Row("run without ROS", FASTER, 20.0, 26.0),
-        Row("lockstep", FASTER, 7.0, 10.0),
-        Row("lockstep, recorded", FASTER, 5.5, 8.0),
-        Row("grouped, recorded", FASTER, 1.8, 3.0),
-        Row("one process per node, recorded", FASTER, 2.0, 2.5),
+        Ratio("run without ROS", FASTER, 20.0, 26.0),
+        Ratio("lockstep", FASTER, 7.0, 10.0),
+        Ratio("lockstep, recorded", FASTER, 5.5, 8.0),
+        Ratio("grouped, recorded", FASTER, 1.8, 3.0),
+        Ratio("one process per node, recorded", FASTER, 2.0, 2.5),
     ),
     rounds=5,
 )
@@ -302,22 +301,19 @@ def measure_stack(way: str, length: float) -> tuple[float, float]:
     return tuple(1e-6 * median(report[i] for report in reports) for i in (0, 1))
 
 
-def round_trip(quick: bool) -> Measured:
+def round_trip(quick: bool) -> Values:
     """From a motor state to the motor current, driver to velocity_loop and back, and a bare relay of two hops.
 
     Both send a JointState of four motors every millisecond, on the same executor.  Two processes have a processor
     each: where the kernel moves them from one to the other, a round of either lasts 120 to 270 us as it happens.
     """
     length = 0.5 if quick else 2.0
-    while True:
-        found = {}
-        for way in WAYS:
-            both = {RELAY: measure_relay(way, length), "": measure_stack(way, length)}
-            for kind, latencies in both.items():
-                found |= {
-                    f"{kind}{way}, {name}": 1e6 * one for name, one in zip(("p50", "p99"), latencies, strict=True)
-                }
-        yield found
+    found = {}
+    for way in WAYS:
+        both = {RELAY: measure_relay(way, length), "": measure_stack(way, length)}
+        for kind, latencies in both.items():
+            found |= {f"{kind}{way}, {name}": 1e6 * one for name, one in zip(("p50", "p99"), latencies, strict=True)}
+    return found
 
 
 RELAY = "relay, "
@@ -325,10 +321,10 @@ ROUND_TRIP = Benchmark(
     round_trip,
     "state to current at 1 kHz [us]",
     (
-        Row("one process, p50", RELAY + "one process, p50", 1.15, 0.9),
-        Row("one process, p99", RELAY + "one process, p99"),
-        Row("two processes, p50", RELAY + "two processes, p50", 1.05, 0.9),
-        Row("two processes, p99", RELAY + "two processes, p99"),
+        Ratio("one process, p50", RELAY + "one process, p50", 1.15, 0.9),
+        Ratio("one process, p99", RELAY + "one process, p99"),
+        Ratio("two processes, p50", RELAY + "two processes, p50", 1.05, 0.9),
+        Ratio("two processes, p99", RELAY + "two processes, p99"),
     ),
     rounds=11,
 )
@@ -408,28 +404,22 @@ START = "wam demo to first motion [s]"
 BRAKED = "braked next to busy loops"
 
 
-def real_time(quick: bool) -> Measured:
+def real_time(quick: bool) -> Values:
     """Periods that the driver keeps in realtime, without and with busy loops, and the start of `wam demo`."""
     with tempfile.TemporaryDirectory(prefix="wam_bench_") as name:
         folder = Path(name)
-        short = short_form(folder)
-        while True:
-            found, turn = {}, time.monotonic_ns()
-            for row, loops in ((KEPT, 0), (KEPT_LOADED, 1 if quick else 4)):
-                with busy_loops(loops):
-                    _, passed = demonstration(folder, f"{loops}_{turn}", [*(short if quick else []), "--realtime"])
-                found[row] = kept(folder / "bags" / f"{loops}_{turn}")
-            yield {
-                **found,
-                BRAKED: float(not passed),
-                START: first_motion(folder, f"start_{turn}", short),
-            }
+        short, found = short_form(folder), {}
+        for row, loops in ((KEPT, 0), (KEPT_LOADED, 1 if quick else 4)):
+            with busy_loops(loops):
+                _, passed = demonstration(folder, f"beside_{loops}", [*(short if quick else []), "--realtime"])
+            found[row] = kept(folder / "bags" / f"beside_{loops}")
+        return {**found, BRAKED: float(not passed), START: first_motion(folder, "start", short)}
 
 
 REAL_TIME = Benchmark(
     real_time,
     "in real time",
-    (Row(KEPT, "", 99.0, 99.7), Row(KEPT_LOADED, "", 98.0, 99.7), Row(BRAKED), Row(START, "", 2.0, 1.5)),
+    (Ratio(KEPT, "", 99.0, 99.7), Ratio(KEPT_LOADED, "", 98.0, 99.7), Ratio(BRAKED), Ratio(START, "", 2.0, 1.5)),
     rounds=5,
 )
 

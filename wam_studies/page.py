@@ -45,9 +45,10 @@ def block(measured: Measurement, command: str, picture: str = "") -> str:
     count = len(measured.total)
     head = f"Written by `{command}`: {count} cases on {measured.date}, code and configuration `{measured.code}`."
     shown = f"![{measured.study.title}]({picture})" if picture else ""
-    missed = measured.scores.missed
-    verdict = "\n".join(["Missed:", "", *(f"- {one}" for one in missed)]) if missed else "Every required value is met."
-    table = rows_table([row for row in measured.scores.rows if row.is_bounded])
+    bounded = [row for row in measured.scores.rows if row.is_bounded]
+    missed = sum(row.is_missed for row in bounded)
+    verdict = f"Missed: {missed} of these required values." if missed else "Every required value is met."
+    table = rows_table(bounded)
     return "\n\n".join(filter(None, [head, shown, verdict, table]))
 
 
