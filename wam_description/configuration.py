@@ -217,9 +217,11 @@ def differences(path: Path, loaded: Configuration) -> list[str]:
     path : of the configuration; of a packaged one, or one without a base, there are no lines.
     loaded : from it.
     """
-    if path.resolve().parent in _present_folders() or (last := files_of(path)[-1]) == path:
+    folders = _present_folders()
+    base_file = next((one for one in files_of(path) if one.resolve().parent in folders), path)
+    if base_file == path:
         return []
-    own, base = loaded.sections, Configuration.load(last).sections
+    own, base = loaded.sections, Configuration.load(base_file).sections
     changed = {
         key if section == SHARED else f"{section}:{key}": (base.get(section, {}).get(key), value)
         for section, flat in own.items()
@@ -232,7 +234,7 @@ def differences(path: Path, loaded: Configuration) -> list[str]:
     is_open = lengths and not any(name in changed for name in MASSES)
     question = f"{', '.join(lengths)} changed: is the link as heavy as before? If not, change {', '.join(MASSES)}"
     return [
-        f"{path} differs from {last.stem}:",
+        f"{path} differs from {base_file.stem}:",
         *rows[: FILES.differences],
         *more,
         *([question] if is_open else []),

@@ -19,7 +19,7 @@ from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
 from wam_driver.imperfections import AmplifierParameters, SensorParameters
-from wam_driver.limit_watch import LimitWatch
+from wam_driver.limit_watch import CURE, LimitWatch
 from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import Sensors
@@ -236,10 +236,10 @@ class Driver:
         pushed, tick = self._last_push
         since = (self._tick - tick) * self._timing.period
         if now:
-            return f"a push acts ({now}): push or command less"
+            return f"a push acts ({now}); push less, or {CURE}"
         if pushed and since <= DRIVER.recent:
-            return f"a push acted until {since:.2f} s before ({pushed}): push or command less"
-        return "command less; if little is commanded, a controller has a wrong sign or too large a gain"
+            return f"a push acted until {since:.2f} s before ({pushed}); push less, or {CURE}"
+        return CURE
 
     def _watch_braking(self) -> None:
         """Name the first cable that breaks under the brakes."""

@@ -9,6 +9,8 @@ from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.thresholds import DRIVER
 
+CURE = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
+
 
 class WatchedLimit(NamedTuple):
     """A quantity near its limit, which is a warning, or above it, which is a fault; `where` is '' or text behind it."""

@@ -14,6 +14,7 @@ from wam_driver.arm_driver_node import ArmDriver
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_parameters import SIMULATED
 from wam_driver.bus.line import line_of
+from wam_driver.limit_watch import CURE, LimitWatch
 from wam_driver.safety import Mode, Safety
 from wam_driver.thresholds import DRIVER
 
@@ -31,6 +32,8 @@ class BusDriver(ArmDriver):
         if self.shared.timing.mode != "realtime":
             raise ParameterError("timing.mode is lockstep, which is for simulated arms; set it to realtime")
         self._watchdog = self.own.watchdog
+        self._limits = LimitWatch(self.shared.arm, self.own.cover_speed_limit, self.own.tip_speed_limit)
+        self._near: tuple[str, ...] = ()
         self.hardware: ArmBus = self.make_hardware(self.shared, self.own)
         held = "only the windings of the motors brake, and the arm sinks"
         self.safety = Safety(self._release, lambda: self.hardware.brake(True), held)
@@ -82,13 +85,14 @@ class BusDriver(ArmDriver):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The same, where there is something to do."""
-        return (self.advice,) if self.advice else ()
+        """The same, where there is something to do; else what is near a limit."""
+        return (self.advice,) if self.advice else self._near
 
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
         hardware, timing, publish = self.hardware, self.shared.timing, self.outlets.publish
         position, velocity, current = hardware.state
+        self._watch(hardware.state)
         torque = [i * k for i, k in zip(current, self.shared.arm.motors.torque_constant, strict=True)]
         for stamp in range(self.stamp - (due - 1) * timing.period_ns, self.stamp + 1, timing.period_ns):
             is_outer = timing.is_outer(stamp)
@@ -100,6 +104,17 @@ class BusDriver(ArmDriver):
         self.health.counts["steps"] += 1
         self.health.counts |= hardware.counts
         self.health.report(self.stamp)
+
+    def _watch(self, state: State) -> None:
+        """Trip a released arm on the first quantity above its limit; warn of those near it.
+
+        No tension of a cable is known.
+        """
+        is_released = self.safety.mode is Mode.ENABLED
+        watched = self._limits.watched(*state, [0.0] * len(state.effort)) if is_released else []
+        self._near = tuple(limit.warning for limit in watched)
+        if excess := next(filter(None, (limit.excess for limit in watched)), ""):
+            self.trip(fault("limit", excess=excess, cure=CURE))
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Send currents, A, that answer the state of a stamp, ns."""
@@ -119,6 +134,7 @@ class BusDriver(ArmDriver):
 
     def _release(self) -> None:
         self._command_stamp = self.stamp
+        self._limits.begin(self.hardware.state.position)
         self.hardware.brake(False)
 
     def reset_fault(self) -> Answer:

@@ -10,7 +10,7 @@ SIMULATED = "simulated"
 
 @dataclass(frozen=True)
 class BusParameters(DriverParameters):
-    """Parameters of the bus and of the simulated driver; of the latter a real arm uses the watchdog."""
+    """Parameters of the bus and of the simulated driver; of the latter a real arm uses the watchdog and the limits."""
 
     interface: str = parameter("of python-can, as socketcan; simulated: the plant with the controllers' bus before it")
     channel: str = parameter("of the interface, as can0; of a simulated bus the version of the controllers' firmware")
