@@ -144,10 +144,10 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
     q, sd, none = POSES[0], np.full(4, 0.015), np.zeros(4)
     jacobian, pushed = BODY.tool_jacobian(q), PushedArm(BODY)
 
-    def step(force: float, allowed: float = 20.0, periods: int = 1) -> list[float]:
+    def step(force: float, is_bouncing: bool = False, periods: int = 1) -> list[float]:
         torques = WorldTorques(none + force * UP @ jacobian, none, None, sd)
         for _ in range(periods):
-            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, (allowed, LIMIT), True, 0.03, OWN, DT)
+            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, (20.0, LIMIT), True, is_bouncing, 0.03, OWN, DT)
         return [row.speed for row in rows]
 
     def direct(force: float) -> float:
@@ -156,21 +156,20 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
         return float(size / np.linalg.norm(jacobian, 2))
 
     assert step(10.0)[0] < 0.0
+    assert step(80.0, is_bouncing=True)[0] > 0.0, "the impact of the commanded touch"
     assert pushed.event is None
     assert step(200.0)[0] > 0.0
     assert pushed.event is not None
     assert pushed.event.code is Code.PUSHED
-    assert pushed.event.values == {
-        "cause": "pushed",
-        "force": pytest.approx(direct(200.0)),
-        "allowed": 20.0,
-        "limit": LIMIT,
-    }
+    found = {"cause": "pushed", "force": pytest.approx(direct(200.0)), "allowed": 20.0, "limit": LIMIT}
+    assert pushed.event.values == found
     step(0.0, periods=39)
     assert pushed.event is not None
     step(0.0, periods=3)
     assert pushed.event is None
     assert step(0.0) == [], "noise is given no way"
+    step(200.0, is_bouncing=True)
+    assert pushed.event is not None, "above the largest contact force, also an impact is reported"
 
 
 def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> None:
@@ -180,5 +179,5 @@ def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> Non
         size = 40.0 if k < 100 else max(5.0, 40.0 - 0.2 * (k - 100))
         torques = WorldTorques(-size * axis.along, none, None, np.full(4, 0.015))
         allowed = 1.5 * (40.0 if k < 100 else 5.0)
-        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, (allowed, LIMIT), True, 0.03, OWN, DT)
+        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, (allowed, LIMIT), True, False, 0.03, OWN, DT)
         assert pushed.event is None

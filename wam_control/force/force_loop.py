@@ -381,7 +381,7 @@ class ForceLoop:
                 wanted = self._slowed(rows, wanted)
         least = self._pushes(forces, contact, holds, allowed, dt)
         low, high = joint_bounds(self._q, self._body.arm.joints, own)
-        is_yielding = self._pushed.event is not None or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
+        is_yielding = self._pushed.is_yielding or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
         if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
             low, high = accelerated(low, high, self._velocity.tolist(), own.limits.joint_acceleration * dt)
         velocity, unlimited = solve(rows, wanted, least, low, high)
@@ -479,9 +479,10 @@ class ForceLoop:
         # whatever is touched is loaded by the arm's own motion, also where that is not along the commanded force
         has_touched = contact.cover or any(one.watch.touch.has_been for one in run.axes)
         pressed = math.fsum(axis.desired for axis in forces) if has_touched else 0.0
+        is_bouncing = any(one.watch.touch.is_bouncing for one in run.axes)
         bounds = [(own.limits.contact_force, "limits.contact_force")]
         if holds:
-            bounds.append((allowed, "that of the command"))
+            bounds.append((allowed, "the commanded force"))
         elif pressed and len(forces) == len(run.axes):
             bounds.append((own.limits.whole_force * pressed, "limits.whole_force"))
         now = torques.now - run.resting
@@ -490,7 +491,9 @@ class ForceLoop:
         chi2 = max((one.known.chi2 for one in run.axes), default=0.0)
         gain = self._supervision.present * max(own.force_gain)
         torques = WorldTorques(now, torques.before, torques.acceleration, torques.sd)
-        return self._pushed.step(self._q, forces, torques, contact, chi2, min(bounds), bool(pressed), gain, own, dt)
+        return self._pushed.step(
+            self._q, forces, torques, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt
+        )
 
     def _guarded(self, axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
         """What is controlled now, for the guard."""

@@ -84,7 +84,7 @@ class TouchWatch:
     @property
     def is_bouncing(self) -> bool:
         """Whether the first touch was so short ago that an impact turns the force."""
-        return self._since < FORCE.bouncing_time
+        return self.has_been and self._since < FORCE.bouncing_time
 
 
 class Oscillation:

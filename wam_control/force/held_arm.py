@@ -43,6 +43,11 @@ class PushedArm:
         self._allowed = 0.0  # N
         self._from: Array | None = None  # (3,) m, of the tool, where the push began
 
+    @property
+    def is_yielding(self) -> bool:
+        """Whether it is pushed or hit, or was a short time ago."""
+        return self._since <= FORCE.lasting
+
     def step(
         self,
         q: Sequence[float],
@@ -52,6 +57,7 @@ class PushedArm:
         chi2: float,
         bound: tuple[float, str],
         is_pressing: bool,
+        is_bouncing: bool,
         gain: float,
         own: ForceLoopParameters,
         dt: float,
@@ -67,6 +73,7 @@ class PushedArm:
         chi2 : of the torques that the commanded forces do not explain.
         bound : force, N, up to which nothing gives way, and what sets it.
         is_pressing : whether the commanded force presses on something.
+        is_bouncing : whether it has only just touched it; this impact is no push up to `limits.contact_force`.
         gain : of the force law, m/s/N.
         own : parameters of the force loop.
         dt : s.
@@ -81,13 +88,13 @@ class PushedArm:
         hardest = max((push.least for push in pushes), default=0.0)
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
-        allowed, limit = bound
-        allowed = max(allowed, self._allowed * (1.0 - fade))
+        allowed = max(bound[0], self._allowed * (1.0 - fade))
         self._allowed = allowed if is_pressing else 0.0
         if hardest > allowed:
             self._since = 0.0
-            values: dict[str, Value] = {"force": hardest, "allowed": allowed, "limit": limit}
-            self.event = warning(Code.PUSHED, "pushed", **values)
+            if not is_bouncing or hardest > own.limits.contact_force:
+                values: dict[str, Value] = {"force": hardest, "allowed": bound[0], "limit": bound[1]}
+                self.event = warning(Code.PUSHED, "pushed", **values)
         elif self._since > FORCE.lasting:
             self.event = None
         if not pushes:
