@@ -14,7 +14,7 @@ class FakeBus:
     position, velocity, current : of the motors, rad, rad/s, A, as measured.
     is_running : whether these are known; until then `exchange` starts the motors.
     advice : what a person has to do before the motors may be released, '' if nothing.
-    trouble : why the motors were braked, as an exception; None if they were not.
+    trouble : the event because of which the motors were braked; None if they were not.
     counts : numbers of errors that are not a fault, for the diagnostics.
     """
 

@@ -33,6 +33,7 @@ PINNED: Final = (
     "pinned)"
 )
 RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly"
+EXCESS: Final = "{quantity} {value:b} {unit} is above its limit {allowed:g}{where}"
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": (
         "the measured torques",
@@ -67,6 +68,38 @@ KEEPS_PRESSING: Final = ": {part_help}; meanwhile the arm presses on"
 UNBOUNDED: Final = {  # by cause, in place of the next table where the error is infinite
     "error": UNKNOWN + ": {help}",
     "uncertain": UNKNOWN + KEEPS_PRESSING,
+}
+BUS: Final = {  # by cause of a fault on the bus of a real arm
+    "no_safety_module": "motor controllers answer, but the safety module (node 10) does not; check the cable to the "
+    "pendant",
+    "missing": "motor controller {node} does not answer; check its cable",
+    "unknown_node": "node {node} does not belong to this arm; take the configuration of your arm",
+    "not_motor": "node {node} has the role {detail}, which is not the role of a motor controller; disconnect what "
+    "has its number",
+    "firmware": "the firmware of node {node} has no property {detail}",
+    "mixed_firmware": "motor controller {node} has another firmware than controller 1: the number of {detail} differs",
+    "not_awake": "motor controller {node} does not wake up; its status is {detail}; switch the arm off and on",
+    "wrist": "motor 7 has {detail} poles, allowed 6, those of a wrist; a gimbal has other transmission ratios, and "
+    "this driver does not know it",
+    "counts": "motor controller {node} has {detail} counts per turn, allowed 4096 and 40960",
+    "gain": "motor controller {node} has {detail} counts per N m, far from the maker's value; correct its property "
+    "IPNM",
+    "limit": "motor controller {node} has the largest torque (MT) {detail}; it must be above 0",
+    "index": "motor controller {node} would take the torque of another motor: its index or group is {detail}",
+    "not_zeroed": "motor controller {node} did not take its zero: it is at {detail} counts, not at those of the home "
+    "pose",
+    "no_reply": "motor controller {node} sends no position; check its cable",
+    "jump": "the position of motor {node} jumps; check its encoder, then start in the home pose again",
+    "reset": "motor controller {node} was reset; its zero is lost; check its power, then start in the home pose again",
+    "all_silent": "the safety module answers, but no motor controller does; check the cable of the bus",
+    "no_power": "nothing answers on the bus; check power, cable and adapter",
+    "estop": "E-stop; release it and press Shift-Idle{lamps}",
+    "safety_idle": "the safety module went to idle{lamps}; press Shift-Activate when the arm may move",
+    "safety_silent": "the safety module does not answer; check the cable to the pendant",
+    "controller_idle": "motor controller {node} left the torque mode: {detail}",
+    "foreign": "another computer sends on this bus; end its program",
+    "doubled": "two nodes have the number {node}; give each its own",
+    "not_sent": "the adapter refused {detail} frames; check adapter, cable and power of the arm",
 }
 SENTENCES: Final = {  # by cause
     # the arm holds
@@ -110,9 +143,9 @@ SENTENCES: Final = {  # by cause
     "steps faster, or run it in its own process",
     "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is back where it was before this step; "
-    "{cure}, or lower timing.period",
-    "limit": "{excess}; {cure}",
-    "broken": "{excess} while the brakes hold; check the cable",
+    "{less}, or lower timing.period",
+    "limit": EXCESS + "; {less}",
+    "broken": EXCESS + " while the brakes hold; check the cable",
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one",
@@ -120,7 +153,9 @@ SENTENCES: Final = {  # by cause
     "or end other programs if the computer is busy",
     "long_step": "{step}: no new {topics}; make its steps faster",
     "ended": "{node} has ended; start it again, or 'wam up' if that started it",
+    **{f"bus_{cause}": f"bus: {text}" for cause, text in BUS.items()},
 }
+LESS: Final = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
 HOLDING: Final = "; the arm holds its position"
 GOES_BACK: Final = "other_link"  # cause for which it does not, as its sentence states
 SINCE: Final = ("without a contact", "since the force was last right or rising")
@@ -159,6 +194,8 @@ def sentence(event: Event) -> str:
 
 def _digits(values: Mapping[str, Any]) -> int:
     """Of brief numbers: what is above an allowed number is written so that it is seen."""
+    if "value" in values:
+        return max(3, digits_apart(values["value"], values["allowed"]))
     value, allowed = values.get("error", values.get("force")), values.get("allowed")
     return 2 if value is None or allowed in (None, value) else digits_apart(value, allowed)
 
@@ -171,7 +208,12 @@ def sentences(events: Iterable[Event]) -> str:
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     """What the placeholders of a sentence stand for that are no values."""
     has_touched, is_motors = values.get("has_touched", 0.0) > 0.0, values.get("source") == "motors"
+    push, ago = values.get("push"), values.get("ago", 0.0)
+    acts = f"acted until {ago:.2f} s before" if ago else "acts"
+    less = f"a push {acts} ({push}); push less, or {LESS}" if push else LESS
+    lamps = f": its pendant shows a fault of the {values['detail']}" if values.get("detail") else ""
     found = {"since": SINCE[has_touched], "reach": REACH[has_touched], "calm": CALM[is_motors]}
+    found |= {"less": less, "lamps": lamps}
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         helps = INSTEAD.get((values["part"], values["source"]), helps)

@@ -10,7 +10,7 @@ import numpy as np
 
 from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
-from wam_description.event import fault
+from wam_description.event import Value, fault
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import lengths, parameter, require, rows
@@ -19,7 +19,7 @@ from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
 from wam_driver.imperfections import AmplifierParameters, SensorParameters
-from wam_driver.limit_watch import CURE, LimitWatch
+from wam_driver.limit_watch import LimitWatch, excess
 from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import Sensors
@@ -198,7 +198,7 @@ class Driver:
         self.plant.step(torque, self._timing.substeps)
         if trouble := self.plant.trouble():
             self.plant.recover()
-            self.safety.trip(fault("simulation", trouble=trouble, cure=self._advice))
+            self.safety.trip(fault("simulation", trouble=trouble, **self._pushed))
             enabled = False
         self._begin_period(self._tick + 1)
         self._measure()
@@ -224,29 +224,25 @@ class Driver:
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
             if heat > DRIVER.warning
         ]
-        if watched and (excess := next(filter(None, (limit.excess for limit in watched)), "")):
-            self.safety.trip(fault("limit", excess=excess, cure=self._advice))
+        if watched and (event := excess(watched, "limit", **self._pushed)):
+            self.safety.trip(event)
         elif sunk := self.plant.sunk():
             self.safety.trip(fault("sunk", reason=sunk))
 
     @property
-    def _advice(self) -> str:
-        """What to do about an arm that moves or is loaded beyond a limit: less of what it is commanded, or pushed."""
-        now = self.plant.pushes_in_words()
+    def _pushed(self) -> dict[str, Value]:
+        """The push that acts, or acted a short time before, s; '' for none."""
+        if now := self.plant.pushes_in_words():
+            return {"push": now, "ago": 0.0}
         pushed, tick = self._last_push
-        since = (self._tick - tick) * self._timing.period
-        if now:
-            return f"a push acts ({now}); push less, or {CURE}"
-        if pushed and since <= DRIVER.recent:
-            return f"a push acted until {since:.2f} s before ({pushed}); push less, or {CURE}"
-        return CURE
+        ago = (self._tick - tick) * self._timing.period
+        return {"push": pushed * (ago <= DRIVER.recent), "ago": ago}
 
     def _watch_braking(self) -> None:
         """Name the first cable that breaks under the brakes."""
         tensions = self._largest_tensions()
-        broken = next(filter(None, (limit.excess for limit in self._watch.tensions(tensions))), "")
-        if broken:
-            self.safety.damage(fault("broken", excess=broken))
+        if broken := excess(self._watch.tensions(tensions), "broken"):
+            self.safety.damage(broken)
 
     def _largest_tensions(self) -> list[float]:
         """Tension of the tight strand of each cable, N, (n,), the largest since the last check."""

@@ -1,15 +1,13 @@
 """What the driver watches: each quantity, its limit, and the warning near it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from wam_description.arm import Arm
-from wam_description.number_text import brief, digits_apart
+from wam_description.event import Event, Value, fault
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.thresholds import DRIVER
-
-CURE = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
 
 
 class WatchedLimit(NamedTuple):
@@ -27,12 +25,18 @@ class WatchedLimit(NamedTuple):
         return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}{self.where}"
 
     @property
-    def excess(self) -> str:
-        """That the quantity is above its limit, which is a fault; '' while it is not."""
-        if self.value <= self.limit:
-            return ""
-        value = brief(self.value, max(3, digits_apart(self.value, self.limit)))
-        return f"{self.quantity} {value} {self.unit} is above its limit {self.limit:g}{self.where}"
+    def is_exceeded(self) -> bool:
+        """Whether the quantity is above its limit, or not a number."""
+        return not self.value <= self.limit
+
+
+def excess(watched: Iterable[WatchedLimit], cause: str, **values: Value) -> Event | None:
+    """The fault of the first quantity that is above its limit, with further values; None where none is."""
+    for one in watched:
+        if one.is_exceeded:
+            names = {"quantity": one.quantity, "unit": one.unit, "where": one.where}
+            return fault(cause, value=one.value, allowed=one.limit, **names, **values)
+    return None
 
 
 class LimitWatch:

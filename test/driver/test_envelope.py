@@ -18,7 +18,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ForceCommand, Wrench
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
-from wam_driver.limit_watch import LimitWatch, WatchedLimit
+from wam_driver.limit_watch import LimitWatch, WatchedLimit, excess
 from wam_driver.safety import Mode
 from wam_driver.thresholds import DRIVER
 
@@ -216,10 +216,12 @@ def test_joint_limits_and_currents_are_watched() -> None:
     at[1] = 0.95 * ARM.joints.lower[1]
     assert list(watched(watch, at)) == [name]
     at[1] = ARM.joints.lower[1] - 0.001
-    assert watched(watch, at)[name].excess.endswith(": joint2 is at -2.357 rad, its stop at -2.356 rad")
+    beyond = excess(watched(watch, at).values(), "broken")
+    assert beyond is not None
+    assert ": joint2 is at -2.357 rad, its stop at -2.356 rad" in sentence(beyond)
     near = watched(watch, ARM.joints.start, [0.0, -0.95 * ARM.motors.peak_torque[1] / 0.25, 0.0, 0.0])
     assert list(near) == ["current of motor2"]
-    assert watched(watch, [math.nan] * N)[name].excess
+    assert watched(watch, [math.nan] * N)[name].is_exceeded
 
 
 def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> None:
@@ -227,9 +229,9 @@ def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> 
     at, name = list(ARM.joints.start), "travel of joint2 from the middle of its range"
     at[1] = ARM.joints.upper[1] + 0.02
     watch.begin(np.linalg.solve(np.reshape(ARM.joint_from_motor, (N, N)), at).tolist())
-    assert not watched(watch, at)[name].excess
+    assert not watched(watch, at)[name].is_exceeded
     at[1] += 0.06
-    assert watched(watch, at)[name].excess
+    assert watched(watch, at)[name].is_exceeded
 
 
 def test_an_arm_that_is_driven_into_a_stop_is_stopped() -> None:

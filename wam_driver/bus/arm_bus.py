@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from wam_description.arm import Arm
+from wam_description.event import Event
 from wam_description.signals import State
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.cycle import Cycle
@@ -41,7 +42,7 @@ class ArmBus:
 
     def clear(self) -> None:
         """Forget a fault; the start-up is repeated where controllers or their zero may be lost."""
-        if self.trouble and self.trouble.fault.loses_controllers:
+        if self.trouble and BusFault(str(self.trouble.cause)).loses_controllers:
             self.begin()
         self._host.trouble = None
 
@@ -66,7 +67,7 @@ class ArmBus:
         )
 
     @property
-    def trouble(self) -> Trouble | None:
+    def trouble(self) -> Event | None:
         """The first fault since `begin` or `clear`."""
         return self._host.trouble
 
@@ -115,6 +116,6 @@ class ArmBus:
         except StopIteration as end:
             self._cycle, self.wait = Cycle(self._host, end.value, self._period), Wait.ACTIVATE
         except Trouble as trouble:
-            self._host.trouble = trouble
+            self._host.trouble = trouble.event
         if self._host.refused:
-            self._host.trouble = Trouble(BusFault.NOT_SENT, 0, self._host.refused)
+            self._host.trouble = BusFault.NOT_SENT.event(0, self._host.refused)

@@ -14,7 +14,7 @@ from wam_driver.arm_driver_node import ArmDriver
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_parameters import SIMULATED
 from wam_driver.bus.line import line_of
-from wam_driver.limit_watch import CURE, LimitWatch
+from wam_driver.limit_watch import LimitWatch, excess
 from wam_driver.safety import Mode, Safety
 from wam_driver.thresholds import DRIVER
 
@@ -73,7 +73,7 @@ class BusDriver(ArmDriver):
         if hardware.is_running:
             self._publish(due)
         if hardware.trouble:
-            self.trip(fault("hardware", reason=str(hardware.trouble)))
+            self.trip(hardware.trouble)
         self.announce()
 
     @property
@@ -113,8 +113,8 @@ class BusDriver(ArmDriver):
         is_released = self.safety.mode is Mode.ENABLED
         watched = self._limits.watched(*state, [0.0] * len(state.effort)) if is_released else []
         self._near = tuple(limit.warning for limit in watched)
-        if excess := next(filter(None, (limit.excess for limit in watched)), ""):
-            self.trip(fault("limit", excess=excess, cure=CURE))
+        if event := excess(watched, "limit", push="", ago=0.0):
+            self.trip(event)
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Send currents, A, that answer the state of a stamp, ns."""

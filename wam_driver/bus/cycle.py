@@ -2,8 +2,9 @@
 
 from collections.abc import Collection, Sequence
 
+from wam_description.event import Value
 from wam_driver.bus import frames
-from wam_driver.bus.bus_fault import BusFault, Trouble
+from wam_driver.bus.bus_fault import BusFault
 from wam_driver.bus.frames import HOST, SAFETY, BusGroup, Frame
 from wam_driver.bus.host import Host
 from wam_driver.bus.motor import Motor
@@ -139,8 +140,8 @@ class Cycle:
         if self._host.counts[name] % BUS.stray == 0:
             self._fault(fault, node)
 
-    def _fault(self, fault: BusFault, node: int = 0, detail: object = "") -> None:
+    def _fault(self, fault: BusFault, node: int = 0, detail: Value = "") -> None:
         if fault in (BusFault.ESTOP, BusFault.SAFETY_IDLE) and (lit := faults(self._pendant)):
-            detail = f": its pendant shows a fault of the {' and '.join(lit)}"
-        self._host.trouble = self._host.trouble or Trouble(fault, node, detail)
+            detail = " and ".join(lit)
+        self._host.trouble = self._host.trouble or fault.event(node, detail)
         self.stop()

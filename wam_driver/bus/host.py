@@ -2,6 +2,7 @@
 
 from collections.abc import Container
 
+from wam_description.event import Event
 from wam_driver.bus import frames, properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.frames import SAFETY, Frame
@@ -24,7 +25,7 @@ class Host:
         self.line, self.now = line, line.now
         self.versions: dict[int, int] = {}
         self.refused = 0
-        self.trouble: Trouble | None = None
+        self.trouble: Event | None = None
         self.counts = line.counts
 
     def send(self, frame: Frame) -> None:
@@ -46,7 +47,7 @@ class Host:
         version = self.versions.get(node, 0)
         found = properties.numbers(version, node == SAFETY).get(name)
         if found is None:
-            raise Trouble(BusFault.FIRMWARE, node, f"firmware {version} has no property {name}")
+            raise Trouble(BusFault.FIRMWARE, node, f"{name} (its version is {version})")
         return found
 
     def ask(self, node: int, name: str, attempts: int = BUS.attempts) -> int | None:
