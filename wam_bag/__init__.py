@@ -21,6 +21,6 @@ Files:
 - `bag_file`: the files of a bag found and opened, messages selected by topic and time.
 - `mcap_file`: an MCAP file opened for reading. `message_search`: messages found in a chunk.
 - `mcap_writer`: an MCAP file written. `mcap_records`: records by the `mcap` library, with bounds and limits.
-- `rosbags_file`: a bag of ROS 1 or of SQLite, read by rosbags. `recorder_parameters`: attached parameters of nodes.
+- `rosbags_file`: a bag of ROS 1 or of SQLite, read by rosbags.
 - `limits`: of what is read. `metadata`: metadata.yaml. `safe_yaml`: YAML with bounded effort.
 """

@@ -16,8 +16,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import yaml
 from mcap.records import Channel
 
+from wam_bag import safe_yaml
 from wam_bag.bag_file import files, is_selected, opened, parts, type_of
 from wam_bag.cdr import ENCODINGS
 from wam_bag.columns import (
@@ -33,11 +35,10 @@ from wam_bag.columns import (
     series,
 )
 from wam_bag.errors import BagError, Damage
-from wam_bag.losses import PARAMETERS, Losses, losses
+from wam_bag.losses import PARAMETERS, RECORDING, Losses, losses
 from wam_bag.mcap_file import BagFile
 from wam_bag.message_search import NEVER
 from wam_bag.message_text import full_name
-from wam_bag.recorder_parameters import mode_of, with_nodes_of
 
 __all__ = [
     "Bag", "BagError", "BoolColumns", "Columns", "JointColumns", "Messages", "PointColumns",
@@ -214,3 +215,40 @@ def _require(path: str | Path, selected: Collection[str] | None, present: Collec
                 f"{path} has no topic '{name}'; its topics: {', '.join(sorted(present)) or 'none'}. "
                 "Names may omit the namespace; may_lack=True reads the topics that are there"
             )
+
+
+# parameters of nodes that a recorder attached
+
+
+def with_nodes_of(before: bytes, after: bytes) -> bytes:
+    """The later parameters with those of nodes that only the earlier ones have, unless one of them is unreadable.
+
+    A recorder attaches them again when it knows those of more nodes, and a tool that merges bags takes those of each.
+    """
+    try:
+        nodes, known = safe_yaml.load(after), safe_yaml.load(before)
+    except (yaml.YAMLError, UnicodeDecodeError):
+        return after
+    if not (isinstance(nodes, dict) and isinstance(known, dict) and known.keys() - nodes.keys()):
+        return after
+    return safe_yaml.dump({**known, **nodes}).encode()
+
+
+def mode_of(metadata: Mapping[str, Mapping[str, str]], parameters: bytes | None) -> str:
+    """'realtime', 'lockstep' or 'unknown': by the recorder's metadata, else by the parameters of its nodes.
+
+    A recorder that was killed left only the parameters.
+    """
+    recorded = metadata.get(RECORDING, {}).get("mode")
+    if recorded is not None or parameters is None:
+        return recorded or "unknown"
+    try:
+        modes = {_timing_mode(node["ros__parameters"]) for node in safe_yaml.load(parameters).values()}
+    except (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError):
+        return "unknown"
+    known = sorted(str(mode) for mode in modes - {None})
+    return known[0] if len(known) == 1 else "unknown"
+
+
+def _timing_mode(parameters: Mapping[str, Any]) -> Any:
+    return parameters.get("timing", {}).get("mode", parameters.get("timing.mode"))

@@ -168,10 +168,16 @@ class Processes(Closing):
     ) -> None:
         names = node_names(configuration)
         self.killed: list[str] = []
-        self.processes = {
-            ", ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
-            for group, place in placed_groups(configuration.shared, processes)
-        }
+        self.processes: dict[str, NodeProcess] = {}
+        self._nodes: dict[str, list[str]] = {}
+        for group, place in placed_groups(configuration.shared, processes):
+            nodes = [names[entry] for entry in group]
+            self._nodes[", ".join(nodes)] = nodes
+            self.processes[", ".join(nodes)] = NodeProcess(configuration, group, namespace, log_level, place)
+
+    def nodes_of(self, process: str) -> list[str]:
+        """The nodes in a process."""
+        return self._nodes[process]
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
@@ -187,7 +193,7 @@ class Processes(Closing):
     @property
     def failures(self) -> list[str]:
         """Nodes that have ended and should not have; why, they have printed themselves."""
-        return [f"{process_of(name)} {_ending(code)}" for name, code in self.ended().items() if code]
+        return [f"{process_of(self._nodes[name])} {_ending(code)}" for name, code in self.ended().items() if code]
 
     def close(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
@@ -196,7 +202,7 @@ class Processes(Closing):
         """
         deadline = time.monotonic() + PROCESS_LIMITS.end
         before = self.ended()
-        first = [name for name in self.processes if FIRST in name.split(", ")]
+        first = [name for name, nodes in self._nodes.items() if FIRST in nodes]
         others = [name for name in self.processes if name not in (*first, LAST)]
         if any(code < 0 for code in before.values()):
             for process in self.processes.values():
@@ -227,14 +233,14 @@ class Processes(Closing):
                 LOGGER.warning(f"waiting for the recorder to write the bag, {seconds:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
-        LOGGER.error(f"{process_of(name)} is killed: it {reason}")
+        LOGGER.error(f"{process_of(self._nodes[name])} is killed: it {reason}")
         self.killed.append(name)
         self.processes[name].kill()
 
 
-def process_of(nodes: str) -> str:
+def process_of(nodes: Sequence[str]) -> str:
     """What a message calls a process: its node, or the nodes that share it."""
-    return f"the process of the nodes {nodes}" if "," in nodes else f"node {nodes}"
+    return f"the process of the nodes {', '.join(nodes)}" if len(nodes) > 1 else f"node {nodes[0]}"
 
 
 def _ending(code: int) -> str:
@@ -282,6 +288,10 @@ class Composition(Nodes):
         self._may_end = {
             name: node for name, node in self.nodes.items() if hasattr(getattr(node, "node", node), "done")
         }
+
+    def nodes_of(self, process: str) -> list[str]:
+        """The node of what counts as a process."""
+        return [process]
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name, as if they were processes."""

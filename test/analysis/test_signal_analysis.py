@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wam_analysis.measures.efficiency import efficiency
+from wam_analysis.findings.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle

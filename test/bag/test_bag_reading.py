@@ -31,11 +31,11 @@ from wam_bag.bag import (
     PointColumns,
     TableColumns,
     WrenchColumns,
+    mode_of,
     read,
 )
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC
-from wam_bag.recorder_parameters import mode_of
 from wam_bag.repair import repair
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"

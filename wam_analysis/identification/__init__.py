@@ -5,7 +5,6 @@ unknowns    what is estimated: names, present values, prior standard deviations
 regressor   motor torques per parameter
 fit         estimate, covariance by jackknife, cross-validation
 tracked_errors  covariance of parameters, and in the errors of the model that the contact estimator tracks
-stribeck    the Stribeck velocity of each motor
 contradictions  mistakes of a recording that would give a wrong model
 overlay     the estimate as a configuration for --config
 report      the table, and the warnings

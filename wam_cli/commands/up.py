@@ -85,10 +85,13 @@ def run(given: argparse.Namespace) -> int:
         for failure in stack.failures if each else []:  # a node of this process has printed it
             print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
         close_page()
-    for node, code in ended.items():
-        who = "the scenario" if "scenario" in node.split(", ") else process_of(node)
+    is_played = False
+    for process, code in ended.items():
+        nodes = stack.nodes_of(process)
+        is_played |= "scenario" in nodes
+        who = "the scenario" if "scenario" in nodes else process_of(nodes)
         print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
-    if given.scenario and "scenario" in ", ".join(ended).split(", ") and not any(ended.values()):
+    if given.scenario and is_played and not any(ended.values()):
         seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
         print(f"to see whether its commands were carried out: {seen}")
     if stack.bag_failure:
