@@ -201,7 +201,6 @@ def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: 
 
 
 def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path) -> None:
-    """It was left out in silence, and with it a limit of the force."""
     path = tmp_path / "mine.yaml"
     path.write_text(
         "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n"
