@@ -6,6 +6,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 import math
 from collections.abc import Sequence
 from operator import add, sub
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 
 Array = NDArray[np.float64]
+NO_SIGNALS: Final = np.zeros(0)
 
 
 class MomentumObserver:
@@ -81,7 +83,7 @@ class MomentumObserver:
         self._body = RigidBody(arm, parameters.mass_scale)
         cycle = 0 if use_joint_sensors else dither_cycle
         self._side = side = MotorSide(arm, parameters, cycle > 0, model)
-        self._is_link_side, self._no_signals = use_joint_sensors, np.zeros(0)
+        self._is_link_side = use_joint_sensors
         fast, times = parameters.detection_time, [parameters.time_constant]
         if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not cycle:
             times.append(fast)
@@ -149,7 +151,7 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(position, velocity, effort, [], self._no_signals, dt)
+            return self._update(position, velocity, effort, [], NO_SIGNALS, dt)
         if self._side.carries_nothing(state):
             self.reset()
             return True
