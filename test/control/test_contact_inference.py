@@ -396,7 +396,7 @@ def payload_rows() -> list[str]:
             for probabilities, tau in zip(found, every, strict=True):
                 seen = tau + noise
                 precision = np.linalg.inv(COARSE)
-                if detection_statistic(seen.tolist(), precision) > DETECT:
+                if detection_statistic(seen, precision) > DETECT:
                     links = INFERENCE.infer(q, seen.tolist(), precision, load)
                     probabilities.append(1.0 - sum(each.probability for each in links))
         cells = [f"{100 * np.mean(np.array(p) > 0.5):.0f} % of {len(p)}" if p else "none" for p in found]

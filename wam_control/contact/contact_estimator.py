@@ -119,7 +119,7 @@ class ContactEstimator:
         self._in_contact = self._is_above = self._is_blind = False
         self._ended = -math.inf  # by the age of the observer, s
         # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
-        self._before: tuple[float, list[float], float] = 0.0, [], 0.0
+        self._before: tuple[float, Array | None, float] = 0.0, None, 0.0
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
         self.refused = 0
 
@@ -134,7 +134,7 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
-        self._before = 0.0, [], 0.0
+        self._before = 0.0, None, 0.0
         self._fusion.reset()
         self._in_contact = self._is_above = False
         self._ended = -math.inf
@@ -172,18 +172,18 @@ class ContactEstimator:
             too small to be detected: taken for an error of the model, it would be held ever larger.
         """
         observer, parameters = self._observer, self._parameters
-        residual, covariance = observer.torques()
-        torques = tuple(residual)
+        torques, covariance = observer.torques()
+        external = tuple(torques.tolist())
         sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
         if not observer.is_ready:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
             self._fusion.reset()
             reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
-            return ContactEstimate(torques, sd, 0.0, reasons=reason)
+            return ContactEstimate(external, sd, 0.0, reasons=reason)
         precision = inverse(covariance)
         statistic = detection_statistic(torques, precision)
-        late = self._late(residual, precision, statistic)
+        late = self._late(torques, precision, statistic)
         is_calm = self._in_contact or observer.age - self._ended > CONTACT.shaking_time
         fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
@@ -196,21 +196,22 @@ class ContactEstimator:
         if not self._in_contact:
             if was_in_contact:
                 self._fusion.reset()
-            return ContactEstimate(torques, sd, statistic, warning=observer.warning)
+            return ContactEstimate(external, sd, statistic, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
         now = observer.moment() if parameters.inference.fusion_time else None
         hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
         hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
-        return ContactEstimate(torques, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
+        return ContactEstimate(external, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
 
-    def _late(self, torques: list[float], precision: Array, statistic: float) -> float:
+    def _late(self, torques: Array, precision: Array, statistic: float) -> float:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
         then, before, late = self._before
         passed = self._observer.age - then
-        if before and not passed:
+        if before is not None and not passed:
             return late
-        late, change = 0.0, float(precision.dot(torques).dot(np.subtract(torques, before or torques)))
-        if passed > 0.0:
+        late = 0.0
+        if before is not None and passed > 0.0:
+            change = float(precision.dot(torques).dot(torques - before))
             late = self._delay / passed * abs(change) / max(statistic, CONTACT.smallest_statistic)
         self._before = self._observer.age, torques, late
         return late

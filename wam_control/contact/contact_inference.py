@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence_of_weight
 from wam_control.contact.contact_fusion import ContactFusion, Torques
@@ -85,10 +85,9 @@ class _Cover(NamedTuple):
     is_moment_only: bool
 
 
-def detection_statistic(torques: Sequence[float], precision: Array) -> float:
+def detection_statistic(torques: Array, precision: Array) -> float:
     """r^T S^-1 r of external torques r, (n,), N m, with the inverse of their covariance S, (n, n)."""
-    r = np.array(torques)
-    return float(r.dot(precision).dot(r))
+    return float(torques.dot(precision).dot(torques))
 
 
 class ContactInference:
@@ -123,7 +122,7 @@ class ContactInference:
     def infer(
         self,
         q: Sequence[float],
-        torques: Sequence[float],
+        torques: ArrayLike,
         precision: Array,
         load: Array | None = None,
         fusion: ContactFusion | None = None,
@@ -149,10 +148,10 @@ class ContactInference:
         if (size := float(precision.trace())) > (10.0 * CONTACT.smallest_sd) ** -2:
             fusion = None  # together they would be as exact
         if size > CONTACT.smallest_sd**-2:
-            precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(torques)))
+            precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(q)))
         at = np.array(q)
         self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
-        rows = np.zeros((links + 1, 7, len(torques)))  # the last are those of a payload
+        rows = np.zeros((links + 1, 7, len(q)))  # the last are those of a payload
         rows[:, 0] = torques
         np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
         if load is not None:

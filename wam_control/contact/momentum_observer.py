@@ -202,7 +202,7 @@ class MomentumObserver:
             self.is_ready = True
         return True
 
-    def torques(self) -> tuple[list[float], Array]:
+    def torques(self) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
 
         See `ModelErrors`; from joint sensors its errors are those of masses, centres of mass and payload.
@@ -211,7 +211,7 @@ class MomentumObserver:
             self._side.expect()
         self.seen = self._observation()
         torques, covariance = self._errors.corrected(self.seen)
-        return torques.tolist(), self._errors.size * covariance
+        return torques, self._errors.size * covariance
 
     def moment(self) -> Torques:
         """The external torques last given, with what is known of their errors."""
@@ -219,12 +219,12 @@ class MomentumObserver:
         torques = seen.residual - seen.effects.dot(self._errors.errors)
         return Torques(self.age, torques, *self._errors.parts(seen), seen.pose)
 
-    def fast_torques(self) -> tuple[list[float], Array] | None:
+    def fast_torques(self) -> tuple[Array, Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
         if len(self._filters.times) == 1:
             return None
         torques, covariance = self._errors.corrected(self._observation(1))
-        return torques.tolist(), self._errors.size * covariance
+        return torques, self._errors.size * covariance
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
