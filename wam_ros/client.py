@@ -4,7 +4,7 @@ import importlib
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from typing import Any, Final
 
 from rcl_interfaces.srv import DescribeParameters
@@ -96,10 +96,11 @@ class StackClient(Closing):
         """Ask a node and wait for its answer, for this time."""
         client, message = self.service(request)
         name = self.node.resolve_service_name(client.srv_name)
-        if not self.wait(client.service_is_ready, seconds):
-            there = self._nodes_without(request.node) or self._services(request.node)
-            advice = f"there are {', '.join(there)}" if there else START
-            return Answer(False, f"no service {name} within {seconds:g} s; {advice}")
+        services = partial(self._services, request.node)
+        try:
+            self._require(client.service_is_ready, f"no service {name}", services, seconds=seconds)
+        except NoAnswerError as error:
+            return Answer(False, str(error))
         attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
         answer = self.answer(client, message, seconds, attempt)
         if answer is None:
@@ -328,8 +329,10 @@ class StackClient(Closing):
         failure: str,
         others: Callable[[], Sequence[str]] = tuple,
         check: Callable[[], object] = lambda: None,
+        seconds: float | None = None,
     ) -> None:
         """Wait for a condition, unless a check raises; not as long where others are there instead, and no more come."""
+        limit = CALL_LIMITS.answer if seconds is None else seconds
         begin = since = time.monotonic()
         there: Sequence[str] = ()
         while not condition():
@@ -337,8 +340,10 @@ class StackClient(Closing):
             since = now if there != before else since
             if there and now - since > CALL_LIMITS.discovery:
                 raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
-            if now - begin > CALL_LIMITS.answer:
-                raise NoAnswerError(f"{failure} within {CALL_LIMITS.answer:g} s; {START}")
+            if now - begin > limit:
+                nodes = self._nodes_without("")
+                advice = f"there are {', '.join(nodes)}" if nodes else START
+                raise NoAnswerError(f"{failure} within {limit:g} s; {advice}")
             check()
             self.spin_once(0.05)
 

@@ -21,6 +21,7 @@ from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.prediction import largest_force, node_at
+from wam_analysis.findings.tabulated import tabulated
 from wam_analysis.findings.text import SCHEMA, json_text, text
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
@@ -515,7 +516,8 @@ def test_a_number_far_from_its_prediction_is_flagged(samples: dict[str, Analysis
     assert "a 1 +- 0.05 N, predicted 1.2" in deviations((Finding("a", "N", 1.0, 1.2, "", 0.05),))[0]
     assert Finding("a", "N", 1.0, 1.2, "", 0.05).deviates
     assert not Finding("a", "N", 1.0, 1.1, "", 0.05).deviates
-    assert not Finding("a", "s", 1.0, 0.1, "", 0.05, is_ideal=True).deviates
+    ideal = Finding("a", "s", 1.0, 0.1, "", 0.05, is_ideal=True)
+    assert (ideal.deviates, tabulated([ideal])[0][1][1]) == (False, "1 +- 0.05 | 0.1 *")
     assert not Finding("a", "N", math.nan, 1.1, "", 0.05).deviates
 
 

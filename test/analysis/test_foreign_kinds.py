@@ -272,15 +272,8 @@ def brief_rests() -> list[Case]:
         way = np.where(np.arange(len(phase)) * faster / rate % 2.8 < 1.4, 1.0, -1.0)
         position = 0.3 * way * np.cos(math.pi * np.minimum(phase, 1.0))
         sent = joints("/joint_states", np.arange(len(phase)) / rate, ["a"], position=position[:, None])
-        return Case(
-            f"{faster:g}",
-            write,
-            sent,
-            {},
-            "",
-            NOTHING,
-            (f"a: always in motion; a rest shorter than {told} s does not count.",),
-        )
+        said = f"a: always in motion; a rest shorter than {told} s, half the time between two turns, does not count."
+        return Case(f"{faster:g}", write, sent, {}, "", NOTHING, (said,))
 
     return [resting(by_rosbags, 100.0, 1.0, "0.505"), resting(sqlite, 1000.0, 10.0, "0.0505")]
 

@@ -173,6 +173,7 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
     what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
     wrong = [(sentence, section.title) for section in sections for sentence in section.wrong]
     shows = [(sentence, section.title) for section in sections for sentence in section.shows]
+    shows = shows or [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
     lines = (
         _line("Wrong", wrong, "nothing was found."),
         _line("Shows", shows, "nothing that can be evaluated."),

@@ -111,7 +111,8 @@ def _posture_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
 def _posture_errors(recording: AnalysedRecording) -> dict[str, float]:
     """How close all joints came to the posture of each step that moved it without a force or a task, rad, by its name.
 
-    At the end of the step or soon after; of a step that was not played to its end nothing is known.
+    At the end of the step or soon after.  A step that was not played to its end, or ended while its commanded motion
+    went on because of a contact, has no posture to reach.
     """
     run, arm, traces = recording.run, recording.parameters.arm, recording.traces
     command = run.joints("joint_posture_command")
@@ -124,8 +125,11 @@ def _posture_errors(recording: AnalysedRecording) -> dict[str, float]:
     for step in run.steps if recording.outcome == Code.DONE else run.steps[:-1]:
         before, last = np.searchsorted(command.stamp_ns, [step.begin, step.end]) - 1
         is_still = last <= before or np.abs(commanded[last] - commanded[max(before, 0)]).max() <= MOTION.arrived
+        newest = slice(max(last - 1, before + 1), last + 1)
+        speeds = 1e9 * np.diff(commanded[newest], axis=0) / np.diff(command.stamp_ns[newest])[:, None]
+        is_cut = np.any(np.abs(speeds) > MOTION.at_rest)
         is_forced = np.any(traces.during(step.begin, step.end) & traces.commanded.acts)
-        if is_still or is_forced or any(step.begin < end and begin < step.end for begin, end in tasks):
+        if is_still or is_cut or is_forced or any(step.begin < end and begin < step.end for begin, end in tasks):
             continue
         first, after = row_at(angles[0], np.array([step.end, step.end + round(1e9 * HOLD.arrival)]))
         off = np.abs(angles[1][first : after + 1] - commanded[last]).max(axis=1)
@@ -190,7 +194,7 @@ def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     part, seconds = traces.false_percent, traces.false_seconds
     if math.isnan(part):
         return []
-    question = f"contact estimated for at most {TOUCH.false_tolerance:g} % of the time without one"
+    question = f"false contact for at most {TOUCH.false_tolerance:g} % of the time in which nothing touches"
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]

@@ -55,6 +55,7 @@ class Sticking(NamedTuple):
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
     begins : when each motion began, s; none of a motion back and forth.
     shortest : rest that is counted, s.
+    is_turning : whether it is that of a motion back and forth.
     """
 
     stuck: float
@@ -62,6 +63,7 @@ class Sticking(NamedTuple):
     commanded: float
     begins: tuple[float, ...] = ()
     shortest: float = 0.0
+    is_turning: bool = False
 
     @property
     def words(self) -> str:
@@ -69,7 +71,8 @@ class Sticking(NamedTuple):
         if not self.slips:
             return "never moved"
         if not self.stuck and self.slips == 1:
-            return f"always in motion; a rest shorter than {shown(self.shortest, 's')} does not count"
+            turns = ", half the time between two turns," * self.is_turning
+            return f"always in motion; a rest shorter than {shown(self.shortest, 's')}{turns} does not count"
         return f"at rest for {100.0 * self.stuck:.0f} % of the time, moved {times(self.slips)}"
 
 
@@ -78,7 +81,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if rests(source):
         return Sticking(1.0, 0, math.nan)
     still = slips = total = disobeyed = 0
-    shortest = 0.0
+    shortest, is_turning = 0.0, False
     begins: list[float] = []
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
@@ -88,7 +91,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         phases = stick_slip_phases(piece.values["velocity"], rest, least_rows)
         total += len(piece.time)
         if _only_turns(phases, piece.values["velocity"]):
-            slips += 1
+            slips, is_turning = slips + 1, True
             lengths, brief = (
                 np.diff(phases.sticks, axis=1),
                 SHAFT.brief * float(np.median(np.diff(phases.slips, axis=1))),
@@ -107,7 +110,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if not total:
         return None
     unmet = disobeyed / still if command is not None and still else math.nan
-    return Sticking(still / total, slips, unmet, tuple(begins), shortest)
+    return Sticking(still / total, slips, unmet, tuple(begins), shortest, is_turning)
 
 
 def hidden_motion(source: Source) -> float:

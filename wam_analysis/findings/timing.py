@@ -113,7 +113,7 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
         here = "not installed"
     facts = {
         "bag": str(bag.path),
-        "arm": recording.namespace or "/",
+        **({} if recording.is_foreign else {"arm": recording.namespace or "/"}),
         "mode": recording.mode + _pace(recording.loop),
         "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
         "messages": _part_of(sum(counts.values()), sum(whole.values())),
