@@ -21,9 +21,9 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the estimate assumes a force across this link; the torques also fit one along the tube, on this "
-    "link or on the one before it",
-    Reason.PAYLOAD: "a picked-up payload may explain the torques; its probability is the rest to 1",
+    Reason.ALONG: "the estimate assumes a force across this link; a force along the tube of this link, or of the one "
+    "before it, explains the torques as well",
+    Reason.PAYLOAD: "a picked-up payload may also explain the torques; its probability is what the links lack to 1",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "the arm is braked",
 }
@@ -64,9 +64,9 @@ UNCERTAIN: Final = (
     "{desired:.3g} {unit} at {where} may be wrong by {error:b} {unit}, mostly because of {part_text}; allowed: "
     "{allowed:b} {unit} (limits.tolerance)"
 )
-KEEPS_PRESSING: Final = ": {part_help}; meanwhile the arm presses on"
+KEEPS_PRESSING: Final = "; {part_help}; meanwhile the arm presses on"
 UNBOUNDED: Final = {  # by cause, in place of the next table where the error is infinite
-    "error": UNKNOWN + ": {help}",
+    "error": UNKNOWN + "; {help}",
     "uncertain": UNKNOWN + KEEPS_PRESSING,
 }
 BUS: Final = {  # by cause of a fault on the bus of a real arm
@@ -103,38 +103,37 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
 }
 SENTENCES: Final = {  # by cause
     # the arm holds
-    "error": UNCERTAIN + ": {help}",
-    "moved_fast": "the arm moved faster than {speed:g} rad/s when the command began, so the load of the arm is not "
-    "known: the force is applied when the arm is at rest",
+    "error": UNCERTAIN + "; {help}",
+    "moved_fast": "the arm moved faster than {speed:g} rad/s when the command began, so its load is not known; the "
+    "force is applied once the arm is at rest",
     "task": "{reason}",
-    "other_link": "{touched} is touched, but the force is commanded on {cover}: command it on {touched}, or free the "
-    "arm; until the command ends, the arm goes back to where it was free",
+    "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "
+    "arm; until then the arm goes back to where it was free",
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
-    "(limits.free_travel): end the command, bring the arm to the surface, then begin again",
+    "(limits.free_travel); end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
-    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
-    "measured: {reach}",
+    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:.3g} {unit} have been measured for "
+    "{time:b} s; {reach}",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
-    "{measured:.3g} {unit} are measured, {desired:.3g} {unit} are commanded; the surface moves, something else pushes, "
-    "or the friction of the surface has changed its direction",
-    "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but for {time:b} s it has been at {measured:.4g} {unit}; "
-    "allowed error: {allowed:.2g} {unit}: something is in the way, a joint is at its end, or the arm cannot move in "
-    "this direction here",
+    "{measured:.3g} {unit} are measured, {desired:.3g} {unit} are commanded; perhaps the surface moves, something else "
+    "pushes, or the friction of the surface has changed its direction",
+    "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but it has been at {measured:.4g} {unit} for {time:b} s; "
+    "allowed error: {allowed:.2g} {unit}; perhaps something is in the way, a joint is at its end, or the arm cannot "
+    "move in this direction here",
     "speed": RAISE,
     "torques_differ": "the torques are not those of a force at {position:.3g} m of {cover} (chi^2 {chi2:.3g}, allowed: "
-    "{allowed:g}): it acts elsewhere, a second force acts, or friction of motors at rest hides a part of it; correct "
-    "the contact position, use the dither, or free the arm",
-    "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}): a "
-    "second force acts, or the friction of the surface has changed its direction; command the force again",
-    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N ({limit}): the arm "
+    "{allowed:g}); perhaps it acts elsewhere, a second force acts, or friction of motors at rest hides a part of it; "
+    "correct the contact position, use the dither, or free the arm",
+    "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}); "
+    "perhaps a second force acts, or the friction of the surface has changed its direction; command the force again",
+    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N ({limit}); the arm "
     "moves away, by at most limits.free_travel",
-    "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there: "
+    "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there; "
     "command another posture or direction",
-    "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
-    "{allowed:g} times the commanded force (limits.cycle_force): {calm}",
-    "model_off": "the {part} differs from the configured one: if this lasts, declare the load (arm.payload) or run "
-    "'wam identify'; /diagnostics has the difference",
+    "oscillating": "the measured force oscillates by {swing:b} N about {desired:.3g} N, with a period of {period:b} s; "
+    "allowed: {allowed:g} times the commanded force (limits.cycle_force); {calm}",
+    "model_off": "the {part} differs from the configured one; /diagnostics has the difference; if it lasts, {model}",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
@@ -160,8 +159,9 @@ HOLDING: Final = "; the arm holds its position"
 GOES_BACK: Final = "other_link"  # cause for which it does not, as its sentence states
 SINCE: Final = ("without a contact", "since the force was last right or rising")
 REACH: Final = (
-    "no contact is seen: bring the arm to the surface first, command more force, or bend the arm",
+    "nothing is touched; bring the arm to the surface first, command more force, or bend the arm",
     "command a force that the arm can reach, or bend the arm",
+    f"the arm is pulled, or carries a load that is not in its model; {PARTS['resting'][1]}",
 )
 CALM: Final = ("lower force_gain", "lower force_gain, or use joint sensors")
 
@@ -212,8 +212,10 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
     less = f"a push {acts} ({push}); push less, or {LESS}" if push else LESS
     lamps = f": its pendant shows a fault of the {values['detail']}" if values.get("detail") else ""
-    found = {"since": SINCE[has_touched], "reach": REACH[has_touched], "calm": CALM[is_motors]}
-    found |= {"less": less, "lamps": lamps}
+    is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
+    found = {"since": SINCE[has_touched], "reach": REACH[2 if is_pulled else has_touched], "calm": CALM[is_motors]}
+    model = "declare it (arm.payload)" if values.get("part") == "payload" else "run 'wam identify'"
+    found |= {"less": less, "lamps": lamps, "model": model}
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         helps = INSTEAD.get((values["part"], values["source"]), helps)

@@ -42,7 +42,10 @@ class HeldTopic:
     def send(self, stamp: int, value: Wrench) -> str:
         """Publish a value as the answer to a state, ns; returns why that is not possible, '' where it is."""
         if not self._is_taken:
-            return f"the driver of this arm does not take {self._topic}, which is for a simulated arm; push it by hand"
+            return (
+                f"the driver of this arm does not take {self._topic}; a real arm is pushed by hand, that of a "
+                "simulated bus cannot be pushed"
+            )
         others = self._node.count_publishers(self._topic) - self.is_on
         if others > 0:
             self.end()

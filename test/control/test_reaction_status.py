@@ -13,6 +13,8 @@ from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_
 from wam_sim.recorded_run import RecordedStep
 
 SECOND = 1_000_000_000
+PUSH = {"allowed": 20.0, "limit": "limits.whole_force"}
+OFF = {"axis": "press", "desired": 5.0, "unit": "N", "time": 2.0, "allowed": 0.5, "has_touched": 0.0}
 
 
 def named(code: Code, joint: str) -> Event:
@@ -39,14 +41,15 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
         (Event(Code.DONE), "done"),
         (refused("task_command", "no effect"), "no effect"),
         (Event(Code.FAULT, Level.ERROR, {"reason": "the cable slipped"}), "the cable slipped"),
+        (warning(Code.PUSHED, "pushed", force=24.6, **PUSH), "with at least 25 N; allowed: 20 N"),
+        (warning(Code.PUSHED, "pushed", force=20.04, **PUSH), "with at least 20.04 N; allowed: 20 N"),
+        (warning(Code.NOT_REACHED, "force_off", measured=-0.2, **OFF), "for 2 s; nothing is touched"),
         (
-            warning(Code.PUSHED, "pushed", force=24.6, allowed=20.0, limit="limits.whole_force"),
-            "with at least 25 N; allowed: 20 N",
+            warning(Code.NOT_REACHED, "force_off", measured=-5.6, **OFF),
+            "-5.6 N have been measured for 2 s; the arm is p",
         ),
-        (
-            warning(Code.PUSHED, "pushed", force=20.04, allowed=20.0, limit="limits.whole_force"),
-            "with at least 20.04 N; allowed: 20 N",
-        ),
+        (warning(Code.MODEL_OFF, "model_off", part="friction of motor1"), "if it lasts, run 'wam identify'"),
+        (warning(Code.MODEL_OFF, "model_off", part="payload"), "if it lasts, declare it (arm.payload)"),
     ],
 )
 def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: str) -> None:

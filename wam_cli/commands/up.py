@@ -68,7 +68,7 @@ def run(given: argparse.Namespace) -> int:
         if pushing and not configuration.shared.is_simulated:
             raise ValueError(
                 f"{given.scenario}: step '{pushing}' has a push, which the driver of this arm does not take; leave out "
-                "the key push, and push by hand"
+                "the key push; a real arm is pushed by hand, that of a simulated bus cannot be pushed"
             )
     import_nodes(configuration, given)
     stop = Stop()

@@ -225,11 +225,11 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
     if assessment is None or watch is None:
         return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
     here = min(watch.scale, assessment.scale)
-    message = f"domain {assessment.domain}{lowered and ', lowered to be stable: '}{lowered}"
+    message = f"domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
     if assessment.reason:
         message = f"not stable: {assessment.reason}"
     elif watch.factor < 1.0 and mode != "warn":
-        message += f", gains scaled by {watch.factor:.3g}: the contact is stiffer here than where they were tuned"
+        message += f"; gains times {watch.factor:.3g} in this pose, in which the contact is stiffer"
     cycle = assessment.cycle
     facts = {
         "guard.mode": mode,

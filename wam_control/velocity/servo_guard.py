@@ -119,9 +119,9 @@ class ServoGuard:
             require(
                 gain >= enough,
                 f"servo.proportional_gain {_listed(servo.proportional_gain)} cannot hold the arm: {name} at "
-                f"{speed:.3g} rad/s, from arm.joints.speed_limit, is braked with {gain * speed:.3g} N m, less than "
-                f"{VELOCITY.deadband:.0%} of its peak torque, whatever servo.integral_gain is; "
-                f"allowed: at least {_listed([rounded_up(each) for each in least])}",
+                f"{speed:.3g} rad/s, the most that arm.joints.speed_limit allows, is braked with only "
+                f"{gain * speed:.3g} N m; {VELOCITY.deadband:.0%} of its peak torque are needed; allowed: at least "
+                f"{_listed([rounded_up(each) for each in least])}, or a higher arm.joints.speed_limit",
             )
 
     def _accepts(self, servo: Servo, proportional: float, integral: float) -> bool:

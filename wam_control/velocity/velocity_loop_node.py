@@ -1,5 +1,6 @@
 """Node `velocity_loop`: the inner loop, motor states in, motor currents out."""
 
+from math import copysign
 from operator import gt
 
 from wam_control.velocity.dither import Dither
@@ -56,8 +57,8 @@ class VelocityLoopNode:
         each = zip(self._motors, velocity, self._fastest, strict=True)
         name, speed, most = next(one for one in each if abs(one[1]) > one[2])
         self.refusals["motor_velocity_command"] = (
-            f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, "
-            "from arm.joints.speed_limit; it turns no faster than that"
+            f"{speed:.4g} rad/s of {name}; {copysign(most, speed):.4g} rad/s is used instead, the largest that "
+            "arm.joints.speed_limit allows"
         )
         return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
 
