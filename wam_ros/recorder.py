@@ -4,7 +4,7 @@ import re
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
 from wam_bag.cdr import Reading, stamp_reader
@@ -166,18 +166,6 @@ class _Channel:
         return [writer for writer, node in self._writers().items() if node == publisher]
 
 
-class _Arrival(NamedTuple):
-    """A message that came, with the node that sent it, and whether that is of another arm or program."""
-
-    channel: _Channel
-    publisher: str
-    is_foreign: bool
-    data: bytes
-    received: int
-    sent: int
-    number: int
-
-
 class Recorder:
     """Writes every message into the bag and counts it; its memory does not grow with the recording.
 
@@ -210,7 +198,7 @@ class Recorder:
         self._stamps: dict[str, int] = {}
         self._newest = 0  # stamp of all, ns
         self._begin = 0  # no log time is before it, ns
-        self._held: list[_Arrival] | None = []  # until its start is known
+        self._held: list[tuple[Any, ...]] | None = []  # for `_write`, until the start is known
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, offered(topic.depth, topic.latched))
@@ -237,7 +225,7 @@ class Recorder:
         if channel is None:
             return
         publisher, is_foreign = channel.sender_of(data)
-        one = _Arrival(channel, publisher, is_foreign, data, received, sent, number)
+        one = channel, publisher, is_foreign, data, received, sent, number
         channel.numbering(publisher).add(0 if is_foreign else number)  # of several nodes, with numbers of their own
         self._received += 1
         if self._held is not None:
@@ -246,16 +234,17 @@ class Recorder:
                 self._held.append(one)
                 return
             self._begin_at(stamp if stamp and number > 1 else 0)  # before the first one of a publisher nothing was
-        self._write(one)
+        self._write(*one)
 
     def _begin_at(self, begin: int) -> None:
         """Write what came before the first stamp of a message that is not latched."""
         held, self._held, self._begin, self._newest = self._held or [], None, begin, begin
         for one in held:
-            self._write(one)
+            self._write(*one)
 
-    def _write(self, one: _Arrival) -> None:
-        channel, publisher, is_foreign, data, received, sent, number = one
+    def _write(
+        self, channel: _Channel, publisher: str, is_foreign: bool, data: bytes, received: int, sent: int, number: int
+    ) -> None:
         if self._lockstep:
             stamp = channel.stamp_of(data)
             is_unstamped = stamp == 0 and channel.topic.is_numbers  # sent by hand
@@ -272,7 +261,7 @@ class Recorder:
             received = sent = max(stamp, self._begin) if is_free else stamp
         # anybody can send another stamp
         received, sent = min(max(received, 0), _LATEST), min(max(sent, 0), _LATEST)
-        self._try(lambda: self._bag.write(channel.name, data, received, sent, number))
+        self._try(self._bag.write, channel.name, data, received, sent, number)
 
     def flush(self) -> None:
         """Write received messages to disk and see that they are there; call it every few tenths of a second."""
@@ -281,7 +270,7 @@ class Recorder:
 
     def attach(self, name: str, media_type: str, data: bytes) -> bool:
         """Add a file to the bag; False if it cannot be written."""
-        return self._try(lambda: self._bag.attach(name, media_type, data))
+        return self._try(self._bag.attach, name, media_type, data)
 
     @property
     def lost_at_disk(self) -> int:
@@ -309,7 +298,7 @@ class Recorder:
         """
         if self._held is not None:
             self._begin_at(0)
-        self._try(lambda: self._bag.metadata(RECORDING, self._record(unfinished)))
+        self._try(self._bag.metadata, RECORDING, self._record(unfinished))
         self._try(self._bag.close)
 
     def summary(self, unfinished: Sequence[str] = ()) -> str:
@@ -329,10 +318,10 @@ class Recorder:
                 values[f"{key} {LOST_AT_END}"] = str(count.lost_at_end)
         return values
 
-    def _try(self, write: Callable[[], None]) -> bool:
+    def _try(self, write: Callable[..., None], *given: Any) -> bool:
         if not self.failure:
             try:
-                write()
+                write(*given)
             except RecordingError as error:
                 self.failure = f"recording into {self._bag.path} has stopped: {error}; then start a new recording"
         return not self.failure
