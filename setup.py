@@ -21,6 +21,8 @@ PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 # The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (the benchmark `compiled`).
 # The substeps of the plant are C then, too: wam_driver/fast_steps.c.  WAM_COMPILE=auto: only where that is possible.
 COMPILED = (
+    "wam_bag/cdr.py",
+    "wam_bag/value_messages.py",
     "wam_control/contact/contact_estimator.py",
     "wam_control/contact/contact_fit.py",
     "wam_control/contact/contact_fusion.py",
@@ -48,6 +50,7 @@ COMPILED = (
     "wam_control/velocity/transform.py",
     "wam_control/contact/velocity_fit.py",
     "wam_control/velocity/velocity_loop.py",
+    "wam_description/defects.py",
     "wam_description/rigid_body.py",
     "wam_description/signals.py",
     "wam_description/small_matrices.py",
