@@ -60,7 +60,7 @@ class UnplannedContacts(NamedTuple):
     @property
     def sentences(self) -> tuple[str, ...]:
         """What was too hard, and what is not known."""
-        unknown = f"Whether a contact without a commanded force was too hard is not known: {self.unknown}."
+        unknown = f"It is not known whether a contact without a commanded force was too hard: {self.unknown}."
         return (*(one.sentence for one in self.hard), *[unknown][: bool(self.unknown)])
 
 

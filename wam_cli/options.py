@@ -240,15 +240,14 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="each (also without a value): one process for each node. grouped: one for driver and velocity loop, one "
-        "for the recorder, one for the other packaged nodes, one for each node of your own without high_priority. "
-        "Default: one process; in realtime: grouped",
+        help="how the nodes share processes. each (also without a value): one process for each node. grouped: one for "
+        "driver and velocity loop, one for the recorder, one for each node of your own without high_priority, one for "
+        "the rest. Default: one process for all; in realtime: grouped",
     )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="follow the wall clock without waiting for commands, as a real arm does; default: as "
-        "timing.mode is configured",
+        help="follow the wall clock and wait for no command, as a real arm; default: timing.mode of the configuration",
     )
     parser.add_argument(
         "--real-time-factor",

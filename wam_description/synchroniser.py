@@ -257,7 +257,7 @@ class Synchroniser:
 
         def take(stamp: int, value: Any) -> Sequence[Inputs]:
             if not stamp:
-                raise OutOfTime(f"no stamp, which a command has to have that starts a step; {CURE}")
+                raise OutOfTime(f"no stamp; a command that starts a step needs one; {CURE}")
             if clock is None:
                 return self._start(stamp, value)
             now = clock._last

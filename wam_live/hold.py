@@ -51,9 +51,9 @@ class HeldTopic:
             self.end()
             key = KEYS[self._topic]
             return (
-                f"another program publishes {self._topic}; a scenario does from its start to its end, also in steps "
-                f"without a {key}; the arm takes the topic from one program alone: write the {key} into a step of the "
-                f"scenario (key {key}), or start the stack without a scenario: wam up"
+                f"another program publishes {self._topic}, and the arm takes it from one program alone; a scenario "
+                f"publishes it from its start to its end: write the {key} into one of its steps (key {key}), or start "
+                "the stack without a scenario: wam up"
             )
         if self._publisher is None:
             row = BY_NAME[self._topic]

@@ -53,7 +53,7 @@ def free_port(wanted: int | None, notify: Callable[[str], None]) -> int:
     port = next(filter(port_is_free, range(LIVE.port + 1, LIVE.port + LIVE.ports)), LIVE.port)
     if port != LIVE.port:
         notify(
-            f"port {LIVE.port} is taken by another program: a page there may be of another arm; this one's is "
+            f"port {LIVE.port} is taken by another program, perhaps the page of another arm; this page is at "
             f"{url(port)}"
         )
     return port

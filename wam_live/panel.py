@@ -155,7 +155,7 @@ class Controls:
     # made once
 
     def _add_buttons(self) -> None:
-        stop = self._gui.add_button("Emergency stop", hint="stop at once and latch a fault", color="red")
+        stop = self._gui.add_button("Emergency stop", hint="stop at once; 'Fault' under reset ends it", color="red")
         stop.on_click(lambda _: self.requests.put(Call("driver", "estop")))
         for row, buttons in BUTTONS.items():
             group = self._gui.add_button_group(row, tuple(buttons))
@@ -176,7 +176,7 @@ class Controls:
                 force["xyz".index(axis.value[1])] = math.copysign(newtons.value, float(axis.value[0] + "1"))
                 self.requests.put(Press(frame.value, (force[0], force[1], force[2])))
 
-            bend = self._gui.add_button("Bend the arm", hint="before a press: to guard.posture of the force loop")
+            bend = self._gui.add_button("Bend the arm", hint="before a press: moves to guard.posture of the force loop")
             bend.on_click(lambda _: self.requests.put(Bend()))
             self._gui.add_button("Press").on_click(press)
             self._gui.add_button("Let go").on_click(lambda _: self.requests.put(NO_PRESS))
@@ -315,7 +315,7 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
     if snapshot.true.cover:
         lines.append(paragraph(f"true: {contact_text(snapshot.true)}"))
     if pushing:
-        lines.append(paragraph(f"of it by your hand: you push with <b>{pushing:.1f} N</b>"))
+        lines.append(paragraph(f"your hand pushes with <b>{pushing:.1f} N</b> of it"))
     return "".join(lines)
 
 
@@ -323,7 +323,7 @@ def press_text(snapshot: Snapshot, pressing: float) -> str:
     """What becomes of a commanded force, N, as HTML: the force loop may not do it."""
     loop = snapshot.statuses.get("force_loop")
     if loop is not None and any(event.cause != "speed" for event in loop.events):
-        text = f"commanded {pressing:.1f} N, not done: {html.escape(loop.message)}"
+        text = f"commanded {pressing:.1f} N; the force loop reports: {html.escape(loop.message)}"
         return paragraph(text, DOTS[Level.ERROR])
     if not snapshot.measured:
         return paragraph(f"commanded {pressing:.1f} N, nothing is measured yet")

@@ -64,7 +64,7 @@ class ScenarioPlayer:
             return ""
         self.stop()
         return (
-            "the scenario has ended" if code == 0 else "the scenario failed; why, is in its status and on the console"
+            "the scenario has ended" if code == 0 else "the scenario failed; its status and the console have the reason"
         )
 
     def stop(self) -> None:

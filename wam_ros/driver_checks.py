@@ -21,6 +21,7 @@ from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import joint_state
 
 Check = Callable[[DriverBench], str]
+RUNNING: Final = "the driver already runs, and the test does not end it; leave out --running"
 
 
 def _interface(bench: DriverBench) -> str:
@@ -288,7 +289,7 @@ def _agreement(bench: DriverBench) -> str:
 
 def _end(bench: DriverBench) -> str:
     if bench.end is None:
-        raise Untested("the driver already runs; give its command with --driver")
+        raise Untested(RUNNING)
     bench.enable()
     bench.end()
     bench.watch(CONFORMANCE_LIMITS.settle)
@@ -298,7 +299,7 @@ def _end(bench: DriverBench) -> str:
 
 def _session(bench: DriverBench) -> str:
     if bench.restart is None:
-        raise Untested("the driver already runs; give its command with --driver")
+        raise Untested(RUNNING)
     before = bench.status.session
     bench.reported.clear()
     bench.restart()

@@ -248,7 +248,7 @@ def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
         events=(holding(Code.UNEXPLAINED, "other_link", cover="outer_link", touched="inner_link"),),
     )
     page = status_page(Snapshot(measured=0.0, statuses={"force_loop": loop}), pressing=5.0)
-    assert "commanded 5.0 N, not done: another link is touched" in page
+    assert "commanded 5.0 N; the force loop reports: another link is touched" in page
     loop = loop._replace(events=())
     assert "measured 4.8 N" in status_page(Snapshot(measured=4.8, statuses={"force_loop": loop}), pressing=5.0)
 
@@ -480,7 +480,7 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     count = lambda: listener.count_publishers("sim/disturbance")  # noqa: E731
     push = Wrench("outer_link", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
     real = HeldTopic(page, "sim/disturbance", replace(CONFIGURATION.shared, nodes=("mine:Driver",)))
-    assert "does not take sim/disturbance, which is for a simulated arm" in real.send(1, push)
+    assert "does not take sim/disturbance; a real arm is pushed by hand" in real.send(1, push)
     assert hold.send(1, push) == ""
     ros.wait(lambda: count() == 1 and (hold.send(1, push), heard)[1])
     hold.send(1, Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))

@@ -13,6 +13,7 @@ from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
+from wam_description.transmission_map import TransmissionMap
 
 
 def efficiency_section(recording: AnalysedRecording) -> Section | None:
@@ -57,18 +58,15 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
 
 def _losses(signals: TransmissionSignals) -> Numbers:
     """Power lost to friction and creep by the configured parameters, (k,), W."""
-    speed, joint = np.abs(signals.velocity), np.abs(np.nan_to_num(signals.joint_velocity))
-    motors, joints = signals.arm.motors, signals.arm.joints
-    loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
-    loss = loss + joint @ np.array(joints.dynamic_friction) + joint**2 @ np.array(joints.viscous_friction)
-    creep = np.array([circuit.loss_per_torque for circuit in signals.arm.circuits])
-    return loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
+    shafts = (signals.arm.motors, signals.velocity), (signals.arm.joints, np.nan_to_num(signals.joint_velocity))
+    loss = sum(np.abs(v) @ one.dynamic_friction + v**2 @ one.viscous_friction for one, v in shafts)
+    creep = [circuit.loss_per_torque for circuit in signals.arm.circuits]
+    return loss + signals.load**2 * np.abs(signals.velocity) @ np.array(creep)
 
 
 def _backdrive(arm: Arm, found: TransmissionFriction) -> list[Finding]:
     """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
-    matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
-    motor_per_joint = np.abs(np.linalg.inv(matrix))
+    motor_per_joint = np.abs(TransmissionMap.of(arm).motor_from_joint)
     measured = np.array([found.motors[name].dynamic.value for name in arm.motors.names])
     configured = np.array(arm.motors.dynamic_friction)
     own = np.array([found.joints.get(name, Friction()).dynamic.value for name in arm.joints.names])
@@ -77,10 +75,9 @@ def _backdrive(arm: Arm, found: TransmissionFriction) -> list[Finding]:
         turns = motor_per_joint[:, i]
         needed = turns > 1e-9
         by_motors = float(turns[needed] @ measured[needed])
-        note = "dry friction of the joint and of its motors"
         expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
-        torque = by_motors + float(own[i])
-        findings.append(Finding(f"{name}: backdriving torque", "N m", torque, expected, note))
+        note = "dry friction of the joint and of its motors"
+        findings.append(Finding(f"{name}: backdriving torque", "N m", by_motors + float(own[i]), expected, note))
     return findings
 
 

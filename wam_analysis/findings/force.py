@@ -199,9 +199,11 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
-    margin = f", by the guard up to {shown(min(margins))} times the gains are stable" if margins else ""
+    margin = f"; by the guard, up to {shown(min(margins))} times these gains are stable" if margins else ""
     if settled and not verdict and not wrong:
-        verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
+        verdict.append(
+            f"Stability: {'all forces' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}."
+        )
     return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong)
 
 

@@ -116,14 +116,14 @@ def _touched(run: RecordedRun, stamps: Times) -> Mask:
 
 def _caveats(run: RecordedRun, left_out: float) -> Iterator[str]:
     """About a load from gravity alone; `left_out` is the fraction of the time in which something touched the arm."""
-    yield "The only known load of the motors is gravity: their friction includes what accelerates the links."
+    yield "Only gravity is known as a load of the motors: their friction includes what accelerates the links."
     if left_out > 0.0:
         yield f"{100.0 * left_out:.0f} % of the time is left out, because something pushed or touched the arm."
     unknown = run.lacking(*TOUCHES[: 1 + run.is_simulated])
     if unknown:
         yield (
             f"It was not recorded whether something pushed or touched the arm ({', '.join(unknown)}). "
-            "If so, their friction includes it."
+            "If it did, their friction includes it."
         )
 
 

@@ -29,11 +29,11 @@ from wam_ros.process_signals import bound_leaving
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "enable": ("let the motors follow the commands", (Call("driver", "enable", True),)),
     "disable": ("brake the arm", (Call("driver", "enable", False),)),
-    "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
-    "reset_fault": ("clear the latched fault", (Call("driver", "reset_fault"),)),
+    "estop": ("stop at once; the arm stays stopped until reset_fault", (Call("driver", "estop"),)),
+    "reset_fault": ("end a fault whose cause is gone", (Call("driver", "reset_fault"),)),
     "confirm_home": ("confirm that a real arm is at its home pose", (Call("driver", "confirm_home"),)),
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
-    "tare": ("take the present external torques as zero force", (Call("force_loop", "tare"),)),
+    "tare": ("let the present external torques count as zero force", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
     "step": (
         "pause, then advance the simulated arm by one period",

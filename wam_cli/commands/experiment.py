@@ -42,8 +42,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples",
         choices=("check", "make"),
-        help="check: compare the sample bags with their index in --directory (sizes, checksums); make: record them "
-        "again; without experiment names: those of all experiments and tasks",
+        help="check: compare sizes and checksums of the sample bags with their index in --directory. make: record them "
+        "again. Without names of experiments: all experiments and tasks",
     )
     parser.add_argument(
         "--directory", type=Path, default=Path("bags"), help="directory for bags and pictures; default: bags"

@@ -27,7 +27,7 @@ NEEDS = (
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `wam live` to its parser."""
     parser.add_argument("bag", nargs="?", type=Path, help="show this recording instead of a running stack")
-    where = "namespace of the stack; default: wam. With a bag: that of the arm in it; default: the one with most topics"
+    where = "namespace of the stack, default: wam; or of the arm in the bag, default: the one with most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
     way = parser.add_mutually_exclusive_group()
@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     way.add_argument(
         "--trajectories",
         action="store_true",
-        help="instead of a page, serve the action FollowJointTrajectory, as for MoveIt",
+        help="instead of a page, serve the action FollowJointTrajectory, for example for MoveIt",
     )
     parser.add_argument("--frame-prefix", help="with --tf: prefix of every frame, for example left/")
     parser.epilog = NEEDS

@@ -33,7 +33,9 @@ class SensingParameters:
 
     torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True)
     torque_fraction: float = parameter(
-        "further sd of each measured joint torque, as a fraction of that of the commanded force", high=1.0, live=True
+        "further sd of each measured joint torque, as a fraction of the torque of the commanded force",
+        high=1.0,
+        live=True,
     )
     estimated_torque_sd: float = parameter(
         "as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True

@@ -136,9 +136,8 @@ class CommandAdmission:
         covers, pinned = self._covers, pinned_position(command)
         if pinned is None or command.frame not in covers.names:
             return (
-                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque is for a force across "
-                f"a cover, whose position it pins, in the frame of that cover ({', '.join(covers.names)}); send zero "
-                f"torque, or such a force"
+                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the position of "
+                f"a force across a cover: send both in its frame ({', '.join(covers.names)}), or zero torque"
             )
         cover, place = pinned
         length = covers.length_of(cover)

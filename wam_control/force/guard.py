@@ -224,11 +224,11 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
     """
     if assessment is None or watch is None:
         return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
-    here = min(watch.scale, assessment.scale)
+    here, is_scaled = min(watch.scale, assessment.scale), watch.factor < 1.0 and mode != "warn"
     message = f"domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
     if assessment.reason:
         message = f"not stable: {assessment.reason}"
-    elif watch.factor < 1.0 and mode != "warn":
+    elif is_scaled:
         message += f"; gains times {watch.factor:.3g} in this pose, in which the contact is stiffer"
     cycle = assessment.cycle
     facts = {
@@ -248,7 +248,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
         "deadband that removes it [N]": f"{cycle.deadband:.4g}",
         "verdict": assessment.reason or "accepted",
     }
-    return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
+    return Report(message, bool(assessment.reason) or is_scaled, facts)
 
 
 def _accepted(own: ForceLoopParameters, scale: float) -> ForceLoopParameters:

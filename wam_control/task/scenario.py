@@ -43,7 +43,7 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "its rise time, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "the torque of each joint on the world, N m; it is sent as a `task`",
-    "until_force": "force, N; the step ends when a contact with this force is detected, and fails without one",
+    "until_force": "force, N; the step ends when a contact with this force is detected; without a contact it fails",
     "chirp": "`{newtons, from, to}`: adds a sine to `force`, in the same direction. `newtons`: amplitude, N. The "
     "frequency goes from `from` to `to`, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "

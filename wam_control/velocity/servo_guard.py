@@ -141,8 +141,8 @@ class ServoGuard:
             for scale, delay in sorted({(1.0, 0), (1.0 / fraction, 0), (1.0, late)}):
                 if not is_stable(self._period(mechanism, servo, scale * proportional, scale * integral, delay)):
                     when = f"delayed by {delay} periods" if delay else "on time"
-                    share = f", of which velocity_loop:guard.stability_fraction, {fraction:g}, is accepted"
-                    return f"an oscillation grows with {mechanism.what}, currents {when}{share if scale > 1.0 else ''}"
+                    gains = f" and {scale:.3g} times these gains (velocity_loop:guard.stability_fraction)"
+                    return f"an oscillation grows with {mechanism.what}, currents {when}{gains if scale > 1.0 else ''}"
         return ""
 
     def _period(self, mechanism: Mechanism, servo: Servo, proportional: float, integral: float, delay: int) -> Array:
