@@ -222,7 +222,8 @@ class Synchroniser:
             slot = kept.get(stamp)
             if slot is None:
                 kept[stamp] = {topic: value}
-                group.newest = max(group.newest, stamp)
+                if stamp > group.newest:  # noqa: PLR1730 - half the time of max()
+                    group.newest = stamp
             elif topic in slot:
                 self.strays += 1
             else:
@@ -388,14 +389,14 @@ class Synchroniser:
         Where it waits, `_lacks` is the group that lacks one, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
+        inputs = Inputs()
+        inputs.origins = origins = []
         for group in self._groups:  # before the others: most often it is one of these that is not there yet
             if stamp >= group.until and not group.find(stamp) and not self._is_overdue(group, group.cause(stamp)):
                 self._lacks = group, group.cause(stamp), min([each.cause(stamp) for each in self._groups])
                 return None
-        inputs = Inputs()
-        origins = [group.origin for group in self._groups]
-        for group in self._groups:
             inputs.update(group.found)
+            origins.append(group.origin)
         for topic, newest in self._newest.items():
             if (found := newest.taken(stamp)) is None:
                 inputs[topic] = None
@@ -406,7 +407,6 @@ class Synchroniser:
         before, self._last_done = self._last_done, stamp
         is_next = not before or stamp - before == self._period
         inputs.stamp, inputs.dt = stamp, self._nominal if is_next else seconds(stamp - before)
-        inputs.origins = origins
         return inputs
 
 

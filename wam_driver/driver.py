@@ -180,8 +180,9 @@ class Driver:
         arrival_age : time since the last command arrived, s, on the steady clock; 0 in lockstep.
         """
         enabled = self.safety.mode is Mode.ENABLED
-        for cover in [cover for cover, last in self._push_ends.items() if self._tick > last]:
-            self._end_push(cover)
+        for cover, last in list(self._push_ends.items()):
+            if self._tick > last:
+                self._end_push(cover)
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:

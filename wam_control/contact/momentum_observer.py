@@ -5,7 +5,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
-from operator import add, sub
+from operator import sub
 from typing import Final
 
 import numpy as np
@@ -181,14 +181,11 @@ class MomentumObserver:
         if is_first:
             external, model, qdd = [0.0] * self._n, [-torque for torque in bias], [0.0] * self._n
         else:
-            # map and a plain zip: strict=True takes as long as the work on four numbers
-            rates = [change / span for change in map(sub, momentum, last.momentum)]
-            model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
-            left = model
+            model = left = _unexplained(momentum, last.momentum, bias, last.bias, span)
             if friction:
-                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
+                left = _unexplained(momentum, last.momentum, known, last.known, span)
             external, qdd = list(map(sub, left, tau)), [change / span for change in map(sub, qd, last.qd)]
-        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
+        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0)):
             self._gap += dt
             return False
         present = np.array([*external, *model, *q, *qd, *qdd])
@@ -276,6 +273,14 @@ class MomentumObserver:
         self.torques()
         self._errors.zero(self.seen)
         return ""
+
+
+def _unexplained(
+    momentum: list[float], before: list[float], torque: list[float], torque_before: list[float], span: float
+) -> list[float]:
+    """Torques (n,), N m, besides a known one that change a momentum (n,), N m s, within a span, s."""
+    each = zip(momentum, before, torque, torque_before)  # noqa: B905 - it takes as long as the work on four numbers
+    return [(now - then) / span - 0.5 * (one + other) for now, then, one, other in each]
 
 
 class _Sample:

@@ -69,7 +69,8 @@ class CommandAdmission:
         task: TaskCommand | None = None,
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
-        pressed, refusals = bool(_size(self._force)), dict[str, str]()
+        pressed = bool(_size(self._force))
+        refusals: dict[str, str] = {}
         if force is not None and _size(force) < FORCE.smallest_force:
             force = force._replace(force=ZERO)
         reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
@@ -111,16 +112,16 @@ class CommandAdmission:
         joints = len(self._joints.names)
         is_of_posture = mode == "hybrid" if task is None else len(task.axes) < joints
         self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture, q))
-        useless = {
-            "force_command": task is not None and bool(_size(force)),
-            "joint_posture_command": self._is_ignored,
-            "joint_torque_command": torque is not None,
-        }
-        reason = f"in the mode {mode}; set force_loop:mode to hybrid, or end the command"
-        if task is not None:
-            reason = f"with a task of {len(task.axes)} axes on {joints} joints; end one of them"
-        for topic, is_useless in useless.items():
+        useless = (
+            ("force_command", task is not None and bool(_size(force))),
+            ("joint_posture_command", self._is_ignored),
+            ("joint_torque_command", torque is not None),
+        )
+        for topic, is_useless in useless:
             if is_useless and topic not in refusals:
+                reason = f"in the mode {mode}; set force_loop:mode to hybrid, or end the command"
+                if task is not None:
+                    reason = f"with a task of {len(task.axes)} axes on {joints} joints; end one of them"
                 refusals[topic] = f"{topic} has no effect {reason}"
 
     def _moves(self, posture: Sequence[float], q: Sequence[float]) -> bool:

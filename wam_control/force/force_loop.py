@@ -368,7 +368,7 @@ class ForceLoop:
             run.still_sd = torque_sd
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
-        rows = list[VelocityRow]()
+        rows: list[VelocityRow] = []
         if holds:
             run.held_at = self._hold_at(found) if run.held_at is None else run.held_at
             wanted = np.clip(own.posture_gain * (run.held_at - q), -own.joint_speed_limit, own.joint_speed_limit)
