@@ -27,7 +27,7 @@ class NodeLimits:
     status_size: int = 16_384
     requested_parameters: int = 500  # in one request; a node has half as many
     reason_length: int = 400  # characters; a message may hold a name of any length
-    turn: int = 64  # messages handed on in one turn, about eight inner periods; then timers and services have theirs
+    turn: int = 16  # messages handed on in one turn, about two inner periods; then timers and services have theirs
 
 
 @dataclass(frozen=True)
