@@ -76,7 +76,7 @@ class ListedContact(NamedTuple):
     true: str
     true_position: float
     true_force: float
-    latency: float = NAN
+    latency: float
 
     @property
     def is_false(self) -> bool:
@@ -149,10 +149,9 @@ def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedSt
     bounds = [step.begin for step in steps]
     rows = cut_at(traces.stamp, contacts_by_link(traces.stamp, traces.estimated), bounds)
     detected = list(_detections(traces))
-    listed = (_listed(traces, certainty, steps, begin, end) for begin, end in rows)
     return tuple(
-        one._replace(latency=next((late for row, late in detected if begin <= row < end), NAN))
-        for one, (begin, end) in zip(listed, rows, strict=True)
+        _listed(traces, certainty, steps, begin, end, next((late for row, late in detected if begin <= row < end), NAN))
+        for begin, end in rows
     )
 
 
@@ -272,7 +271,9 @@ def cut_at(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int])
     return parts
 
 
-def _listed(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep], begin: int, end: int) -> ListedContact:
+def _listed(
+    traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep], begin: int, end: int, latency: float
+) -> ListedContact:
     true, estimated = traces.true, traces.estimated
     rows = begin + np.flatnonzero(estimated.acts[begin:end])
     acting = rows[true.acts[rows]]
@@ -285,6 +286,7 @@ def _listed(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep],
         touched,
         median(true.position[there]),
         median(true.size[there]),
+        latency,
     )
 
 

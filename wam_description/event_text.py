@@ -64,9 +64,10 @@ UNCERTAIN: Final = (
     "{desired:.3g} {unit} at {where} may be wrong by {error:b} {unit}, mostly because of {part_text}; allowed: "
     "{allowed:b} {unit} (limits.tolerance)"
 )
+HELPED: Final = "; {help}; the arm holds its position"
 KEEPS_PRESSING: Final = "; {part_help}; meanwhile the arm presses on"
 UNBOUNDED: Final = {  # by cause, in place of the next table where the error is infinite
-    "error": UNKNOWN + "; {help}",
+    "error": UNKNOWN + HELPED,
     "uncertain": UNKNOWN + KEEPS_PRESSING,
 }
 BUS: Final = {  # by cause of a fault on the bus of a real arm
@@ -103,14 +104,15 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
 }
 SENTENCES: Final = {  # by cause
     # the arm holds
-    "error": UNCERTAIN + "; {help}",
+    "error": UNCERTAIN + HELPED,
     "moved_fast": "the arm moved faster than {speed:g} rad/s when the command began, so its load is not known; the "
-    "force is applied once the arm is at rest",
-    "task": "{reason}",
+    "arm holds its position, and the force is applied once it is at rest",
+    "task": "{reason}; the arm holds its position",
     "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "
     "arm; until then the arm goes back to where it was free",
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
-    "(limits.free_travel); end the command, bring the arm to the surface, then begin again",
+    "(limits.free_travel); end the command, bring the arm to the surface, then begin again; the arm holds its "
+    "position",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:.3g} {unit} have been measured for "
@@ -155,8 +157,6 @@ SENTENCES: Final = {  # by cause
     **{f"bus_{cause}": f"bus: {text}" for cause, text in BUS.items()},
 }
 LESS: Final = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
-HOLDING: Final = "; the arm holds its position"
-GOES_BACK: Final = "other_link"  # cause for which it does not, as its sentence states
 SINCE: Final = ("without a contact", "since the force was last right or rising")
 REACH: Final = (
     "nothing is touched; bring the arm to the surface first, command more force, or bend the arm",
@@ -188,8 +188,7 @@ def sentence(event: Event) -> str:
         return str(event.values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
     values = {**event.values, **_parts(event.values)}
     text = (UNBOUNDED if values.get("error") == math.inf else SENTENCES)[cause]
-    end = HOLDING if event.holds and cause != GOES_BACK else ""
-    return _Sentence(_digits(event.values)).vformat(text, (), values) + end
+    return _Sentence(_digits(event.values)).vformat(text, (), values)
 
 
 def _digits(values: Mapping[str, Any]) -> int:
@@ -210,12 +209,15 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     has_touched, is_motors = values.get("has_touched", 0.0) > 0.0, values.get("source") == "motors"
     push, ago = values.get("push"), values.get("ago", 0.0)
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
-    less = f"a push {acts} ({push}); push less, or {LESS}" if push else LESS
-    lamps = f": its pendant shows a fault of the {values['detail']}" if values.get("detail") else ""
     is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
-    found = {"since": SINCE[has_touched], "reach": REACH[2 if is_pulled else has_touched], "calm": CALM[is_motors]}
-    model = "declare it (arm.payload)" if values.get("part") == "payload" else "run 'wam identify'"
-    found |= {"less": less, "lamps": lamps, "model": model}
+    found = {
+        "since": SINCE[has_touched],
+        "reach": REACH[2 if is_pulled else has_touched],
+        "calm": CALM[is_motors],
+        "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,
+        "lamps": f": its pendant shows a fault of the {values['detail']}" if values.get("detail") else "",
+        "model": "declare it (arm.payload)" if values.get("part") == "payload" else "run 'wam identify'",
+    }
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         helps = INSTEAD.get((values["part"], values["source"]), helps)

@@ -36,16 +36,15 @@ def push(stack: StackClient, shared: Shared, wrench: Wrench, seconds: float) -> 
         for message in stack.messages("joint_states", partial(_raise_if_silent, statuses)):
             driver = statuses["driver"]
             if driver.mode != "enabled":
-                stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
-                raise ValueError(f"{stated}: the arm is {_state(driver)}")
+                raise ValueError(f"the arm is {_state(driver)}")
             stamp = stamp_of(message)
-            begin = begin or stamp
-            if stamp - begin > seconds * 1e9:
+            if begin and stamp - begin > seconds * 1e9:
                 break
             if refusal := hold.send(stamp, wrench):
-                raise ValueError(f"not pushed: {refusal}")
-    except TimeoutError as error:
-        stated = "the push ended" if begin else "not pushed"
+                raise ValueError(refusal)
+            begin = begin or stamp
+    except ValueError as error:
+        stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
         raise ValueError(f"{stated}: {error}") from error
     finally:
         release(hold, stamp)
@@ -61,9 +60,9 @@ def release(hold: HeldTopic, stamp: int) -> None:
 
 def _raise_if_silent(statuses: Mapping[str, NodeStatus], silent: float) -> None:
     if PAUSED in statuses["driver"].facts:
-        raise TimeoutError("the arm is paused; wam call resume")
+        raise ValueError("the arm is paused; wam call resume")
     if silent > CALL_LIMITS.silence:
-        raise TimeoutError(f"no joint_states for {CALL_LIMITS.silence:g} s")
+        raise ValueError(f"no joint_states for {CALL_LIMITS.silence:g} s")
 
 
 def _state(driver: NodeStatus) -> str:

@@ -102,21 +102,20 @@ class StackClient(Closing):
         except NoAnswerError as error:
             return Answer(False, str(error))
         attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
-        answer = self.answer(client, message, seconds, attempt)
-        if answer is None:
+        if (answer := self.answer(client, message, seconds, attempt)) is None:
             return Answer(False, f"no answer from {name} within {seconds:g} s; its node is busy or has ended")
         return answer_of(request, answer)
 
     def answer(self, client: Any, message: Any, seconds: float, attempt: float = CALL_LIMITS.attempt) -> Any:
-        """The answer of a service, None where there is none.
+        """The answer of a service, None where there is none, or no service.
 
         An answer can be lost while the service still discovers who asks; asking twice does no harm.
 
         Parameters
         ----------
-        client : of the service, which is ready.
+        client : of the service.
         message : the request.
-        seconds : for the answer.
+        seconds : for the service, then for the answer.
         attempt : s, after which the request is sent again.
         """
         futures: list[Any] = []
@@ -124,6 +123,8 @@ class StackClient(Closing):
         def found() -> list[Any]:  # an earlier one may be answered meanwhile
             return [future for future in futures if future.done()]
 
+        if not self.wait(client.service_is_ready, seconds):
+            return None
         for _ in range(max(1, round(seconds / attempt))):
             futures.append(client.call_async(message))
             if self.wait(found, attempt):
@@ -206,10 +207,9 @@ class StackClient(Closing):
             where it does not answer.
         """
         client = self.client(DescribeParameters, f"{node}/describe_parameters")
-        question, limit = DescribeParameters.Request(names=list(names)), CALL_LIMITS.answer
-        answer = self.answer(client, question, limit) if self.wait(client.service_is_ready, limit) else None
+        answer = self.answer(client, DescribeParameters.Request(names=list(names)), CALL_LIMITS.answer)
         if answer is None:
-            raise NoAnswerError(f"node '{node}' does not answer with its parameters within {limit:g} s; {START}")
+            raise NoAnswerError(f"node '{node}' does not answer with its parameters; {START}")
         return [found.name for found in answer.descriptors if not found.read_only]
 
     # statuses and topics

@@ -184,7 +184,7 @@ class DriverBench(StackClient):
         """The answer of a service; (False, '') where there is none."""
         client, message = self.service(_call(service, switch))
         limit = CONFORMANCE_LIMITS.service_wait
-        answer = self.answer(client, message, limit, limit) if self.wait(client.service_is_ready, limit) else None
+        answer = self.answer(client, message, limit, limit)
         return (bool(answer.success), str(answer.message)) if answer else (False, "")
 
     def lacking(self) -> list[str]:

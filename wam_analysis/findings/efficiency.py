@@ -41,8 +41,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
             )
         elif forward.put > SHAFT.least_work:
             rows = known & (motor > 0.0) & (joint > 0.0)
-            expected = 1.0 - float(np.sum(_losses(signals)[rows])) / float(np.sum(motor[rows]))
-            expected = max(expected, 0.0)
+            expected = max(1.0 - float(np.sum(_losses(signals)[rows]) / np.sum(motor[rows])), 0.0)
             note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
             findings.append(Finding("efficiency, motors to links", "%", 100.0 * forward.ratio, 100.0 * expected, note))
             sentences.append(f"While driving, the motors put {shown(forward.put, 'J')} into the transmission.")
@@ -66,19 +65,16 @@ def _losses(signals: TransmissionSignals) -> Numbers:
 
 def _backdrive(arm: Arm, found: TransmissionFriction) -> list[Finding]:
     """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
-    motor_per_joint = np.abs(TransmissionMap.of(arm).motor_from_joint)
+    turns = np.abs(TransmissionMap.of(arm).motor_from_joint)
     measured = np.array([found.motors[name].dynamic.value for name in arm.motors.names])
-    configured = np.array(arm.motors.dynamic_friction)
-    own = np.array([found.joints.get(name, Friction()).dynamic.value for name in arm.joints.names])
-    findings = []
-    for i, name in enumerate(arm.joints.names):
-        turns = motor_per_joint[:, i]
-        needed = turns > 1e-9
-        by_motors = float(turns[needed] @ measured[needed])
-        expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
-        note = "dry friction of the joint and of its motors"
-        findings.append(Finding(f"{name}: backdriving torque", "N m", by_motors + float(own[i]), expected, note))
-    return findings
+    own = [found.joints.get(name, Friction()).dynamic.value for name in arm.joints.names]
+    torque = np.where(turns > 1e-9, turns * measured[:, None], 0.0).sum(axis=0) + own
+    expected = arm.motors.dynamic_friction @ turns + arm.joints.dynamic_friction
+    note = "dry friction of the joint and of its motors"
+    return [
+        Finding(f"{name}: backdriving torque", "N m", needed, predicted, note)
+        for name, needed, predicted in zip(arm.joints.names, torque.tolist(), expected.tolist(), strict=True)
+    ]
 
 
 class Efficiency(NamedTuple):

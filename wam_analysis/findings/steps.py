@@ -125,9 +125,9 @@ def _posture_errors(recording: AnalysedRecording) -> dict[str, float]:
     for step in run.steps if recording.outcome == Code.DONE else run.steps[:-1]:
         before, last = np.searchsorted(command.stamp_ns, [step.begin, step.end]) - 1
         is_still = last <= before or np.abs(commanded[last] - commanded[max(before, 0)]).max() <= MOTION.arrived
-        newest = [min(max(last - 1, before + 1), last), last]
+        newest = slice(last - 1, last + 1)
         moved, period = np.abs(np.diff(commanded[newest], axis=0)), np.diff(command.stamp_ns[newest]) / 1e9
-        is_cut = moved.max() > MOTION.at_rest * period
+        is_cut = np.any(moved > MOTION.at_rest * period)
         is_forced = np.any(traces.during(step.begin, step.end) & traces.commanded.acts)
         if is_still or is_cut or is_forced or any(step.begin < end and begin < step.end for begin, end in tasks):
             continue

@@ -99,13 +99,10 @@ def _lost(found: Bag, lost: Losses) -> str:
     printed += [f"{lost.gone} of those that were recorded"] if lost.gone else []
     if lost.uncounted:
         printed.append("unknown, see above")
-    if printed:
-        return ", ".join(printed)
-    return (
-        "see above"
-        if lost.sentences(found.first)
-        else f"nothing{', though it had to be repaired' if lost.repaired else ''}"
-    )
+    if not printed:
+        repaired = ", though it had to be repaired" * bool(lost.repaired)
+        printed.append("see above" if lost.sentences(found.first) else f"nothing{repaired}")
+    return ", ".join(printed)
 
 
 def _time(stamp: int) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import yaml
 
-from wam_cli.options import ARM, COUNT, bounded, namespace
+from wam_cli.options import COUNT, bounded, namespace, take_stack
 from wam_control.task.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
@@ -50,9 +50,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `wam call` to its parser."""
     where = argparse.ArgumentParser(add_help=False)
     where.add_argument(
-        "--namespace", type=namespace, default=argparse.SUPPRESS, help="namespace of the stack; default: wam"
+        "--namespace", type=namespace, default=argparse.SUPPRESS, help="namespace of the arm; default: wam"
     )
-    parser.add_argument("--namespace", type=namespace, default=ARM, help="namespace of the stack; default: wam")
+    take_stack(parser)
     requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
     for name, (text, _) in SERVICES.items():
         requests.add_parser(name, parents=[where], help=text, description=f"{text[0].upper()}{text[1:]}.")

@@ -144,9 +144,13 @@ def stoppable_report(bag: Path, failed: bool, task: Experiment | None) -> tuple[
 
 def _report(bag: Path, failed: bool, task: Experiment | None) -> tuple[str, ...] | None:
     """Print the report; what in it is not as it should be, None where a demonstration that failed has no report."""
+    from wam_analysis.findings.analysis import analyse_steps  # not before the nodes
+    from wam_analysis.findings.text import text
+
     try:
-        text, unmet = _report_of_task(task, bag) if task else _report_of_demonstration(bag)
-        print(text, flush=True)
+        found = analyse_steps(bag)
+        report, unmet = _report_of_task(task, bag, found) if task else (text(found), found.unmet)
+        print(report, flush=True)
     except (BagError, OSError) as error:
         if not failed:
             raise
@@ -155,22 +159,13 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> tuple[str, ...]
     return unmet
 
 
-def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
-    from wam_analysis.findings.analysis import analyse_steps  # not before the nodes
-    from wam_analysis.findings.text import text
-
-    found = analyse_steps(bag)
-    return text(found), found.unmet
-
-
-def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
-    from wam_analysis.findings.analysis import analyse_steps  # for the same reason
+def _report_of_task(task: Experiment, bag: Path, found: Any) -> tuple[str, tuple[str, ...]]:
     from wam_studies.tasks.pictures import save
     from wam_studies.thesis.evaluation import evaluate, text
 
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
-    wrong = [f"  {one}" for section in analyse_steps(bag).sections for one in section.wrong]
+    wrong = [f"  {one}" for section in found.sections for one in section.wrong]
     stated = "\n".join([text(task, result), *["", "Wrong"][: 2 * bool(wrong)], *wrong])
     missed = tuple(f"{row.quantity}: MISSED" for row in result.rows if not row.agrees)
     return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed

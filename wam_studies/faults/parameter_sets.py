@@ -162,7 +162,6 @@ def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
     """Send the set; what is wrong goes to the escapes of the stack."""
     before = _present(stack, name)
     client = stack.client(SetParametersAtomically, f"{name}/set_parameters_atomically")
-    stack.wait(client.service_is_ready, 2.0)
 
     def answer(assignments: Iterable[Assignment]) -> Any:
         request = SetParametersAtomically.Request(parameters=list(map(message, assignments)))
