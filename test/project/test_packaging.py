@@ -499,37 +499,3 @@ def test_constraints_pin_every_package_that_make_test_installs(prefix, monkeypat
     needed = {canonicalize_name(one.name) for one in reached("wam_stack", frozenset({"ros", "test"}), set())}
     installed = {name: importlib.metadata.version(name) for name in needed}
     assert installed == {name: pins.get(name) for name in needed}
-
-
-def made(folder: Path, *words: str) -> str:
-    """What make prints in a folder that has the Makefile."""
-    given = {name: value for name, value in os.environ.items() if name not in ("COMPILE", "MAKEFLAGS", "MAKELEVEL")}
-    done = subprocess.run(["make", *words], cwd=folder, env=given, capture_output=True, text=True, check=False)
-    return done.stdout + done.stderr
-
-
-@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_make_install_states_whether_the_inner_loop_is_compiled_and_why_it_is_not(tmp_path: Path) -> None:
-    """Nothing is installed: the files are made by touching them, and a script takes the place of the interpreter."""
-    shutil.copy(ROOT / "Makefile", tmp_path)
-    for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "constraints.txt"):
-        shutil.copy(ROOT / name, tmp_path)
-    for name in ("config", "launch", "resource", "scripts", "wam_driver", ".venv/bin"):
-        (tmp_path / name).mkdir(parents=True)
-    (stamps,) = set(re.findall(r"\.venv/stamps-\d+", made(tmp_path, "-n", "install")))
-    (tmp_path / stamps).mkdir()
-    interpreter = tmp_path / ".venv" / "bin" / "python3"
-    plain = "The inner loop is plain Python, with the same numbers: "
-    for code, compile_, printed in (
-        (0, "auto", "The inner loop is compiled"),
-        (1, "auto", f"{plain}no C compiler with the headers of Python; as C: apt install gcc python3-dev, then make"),
-        (1, "0", f"{plain}COMPILE=0; as C: make install COMPILE=1"),
-    ):
-        interpreter.write_text(f"#!/bin/sh\nexit {code}\n")
-        interpreter.chmod(0o755)
-        made(tmp_path, "--touch", "install", f"COMPILE={compile_}")
-        assert made(tmp_path, "install", f"COMPILE={compile_}").startswith(printed)
-    (tmp_path / stamps / "compile.log.failed").touch()
-    assert f"it could not be compiled, see {stamps}/compile.log.failed" in made(tmp_path, "install", "COMPILE=auto")
-    for wrong in ("2", "yes", "0 1"):
-        assert f"COMPILE is '{wrong}'; allowed: auto, 0, 1" in made(tmp_path, "install", f"COMPILE={wrong}")
