@@ -34,24 +34,32 @@ class AxisRun:
 
     Attributes
     ----------
-    now, known : the axis in the present period, set as the period begins, and what is known of its force.
+    on_links : probability of each link that may be touched, and the axis there, set as a period begins; the most
+        probable first.
+    known : what is known of its force.
     place : where its force acts.
     watch, motion : what is reported of its force, or of its motion.
     anchor : position to hold where none is commanded, m or rad.
-    wound_up : force, N, to which the velocity loops have wound up before its torque is fed forward; NaN until then.
+    wound_up : force, N, to which the velocity loops have wound up before its torque is fed forward; infinite while they
+        do, NaN until the touch.
     rising : force, N, that is commanded by now: from the touch on it goes to the one that is desired.
     side : 1 or -1, on which side along it an impedance is touched.
     is_kept : whether its force is left as it is.
     """
 
     def __init__(self, of: TaskAxis, covers: Covers) -> None:
-        self.now: CommandedAxis
+        self.on_links: list[tuple[float, CommandedAxis]]
         self.known = UNKNOWN
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
         self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
         self.rising = self._shown = 0.0
         self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
+
+    @property
+    def now(self) -> CommandedAxis:
+        """The axis in the present period, on the link that is most probably touched."""
+        return self.on_links[0][1]
 
     def expected(self, own: ForceLoopParameters, dt: float) -> float:
         """Force, N, that the measurement shows if the force is as it is commanded by now.
@@ -157,7 +165,6 @@ class CommandRun:
     joints : what is reported of a posture, of each joint.
     feed_forward : of this command.
     search, ways : what would help a refused force: still to be tried, and found.
-    fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
     """
 
     def __init__(
@@ -181,7 +188,7 @@ class CommandRun:
         self.still_sd = still_sd
         self.delayed: deque[list[float]] = deque()
         self.joints = {name: MotionWatch() for name in arm.joints.names}
-        self.feed_forward, self.fallback = FeedForward(arm), ""
+        self.feed_forward = FeedForward(arm)
         self.search: Iterator[Ways] | None = None
         self.ways: Ways = {}
 

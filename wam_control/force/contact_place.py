@@ -13,7 +13,7 @@ from wam_description.arm import Covers
 from wam_description.signals import BASE, Contact, ForceCommand, Triple
 
 Array = NDArray[np.float64]
-STEEPEST = math.radians(30.0)  # lean of a force from the normal of a link, up to which its position is estimated well
+STEEPEST = 0.5  # sine of the lean of a force from the normal of a link, up to which its position is estimated well
 
 
 class ForcePlace(NamedTuple):
@@ -24,8 +24,7 @@ class ForcePlace(NamedTuple):
     cover, position, position_sd : cover, position along it and its standard deviation, m.
     is_pinned : whether the command or the parameters give it.
     is_known : whether it is pinned, or estimated well enough while something is touched.
-    is_touched : whether it is where the estimator finds the one contact, well enough or as well as it ever will.
-    rejection : why the present estimate is not used, '' if it is or is not needed.
+    is_touched : whether the contact is estimated to be on that cover, but no torque shows where.
     """
 
     cover: str
@@ -34,7 +33,6 @@ class ForcePlace(NamedTuple):
     is_pinned: bool = False
     is_known: bool = False
     is_touched: bool = False
-    rejection: str = ""
 
     def pressed(self, direction: Array, force: float) -> PressedForce:
         """A force there, N, along a direction (3,), base frame."""
@@ -63,14 +61,14 @@ class ContactPlace:
         """Count a way of the link along itself, m: what is touched, or is to be, is touched elsewhere on it."""
         self._slid += way
 
-    def step(self, axis: TaskAxis, contact: Contact, lean: float, parameters: ForceLoopParameters) -> ForcePlace:
-        """Place for the present estimate.
+    def step(self, axis: TaskAxis, contact: Contact, lean: float, parameters: ForceLoopParameters) -> list[ForcePlace]:
+        """Place for the present estimate; one on each link that may be touched while that is not known.
 
         Parameters
         ----------
         axis : of the force; its cover is '' where any link may touch, its position None where it is estimated.
         contact : estimated contact.
-        lean : angle of the force from the normal of the touched cover, rad.
+        lean : sine of the angle of the force from the normal of the touched cover.
         parameters : of the force loop.
         """
         covers = self._covers
@@ -79,29 +77,26 @@ class ContactPlace:
             if at != self._pinned:
                 self._pinned, self._slid = at, 0.0
             position = slid_position(covers, *at, self._slid)
-            return ForcePlace(axis.cover, position, parameters.contact_position_sd, is_pinned=True, is_known=True)
-        is_likely = bool(contact.cover) and not contact.probability < parameters.link_probability_limit
-        is_identified = is_likely and axis.cover in ("", contact.cover)
-        rejection = _rejection(contact, lean) if is_identified else ""
+            return [ForcePlace(axis.cover, position, parameters.contact_position_sd, is_pinned=True, is_known=True)]
         if not contact.cover:
             self._last = None
-        elif is_identified and not rejection:
+        elif (
+            axis.cover in ("", contact.cover)
+            and lean <= STEEPEST
+            and not contact.probability < parameters.link_probability_limit
+        ):
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
-            self._last = self._estimated(contact.cover, contact.position, sd)._replace(is_touched=True)
-        cover = axis.cover or contact.cover or parameters.contact_cover
-        assumed = parameters.contact_position if cover == parameters.contact_cover else math.nan
-        # with a longer press, all but what no torque shows will be known
-        is_found = contact.cover == cover and math.isnan(contact.position)
-        where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)._replace(is_touched=is_found)
-        return where._replace(rejection=rejection)
-
-    def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> ForcePlace:
-        """A position and its standard deviation, m; one that is not known is anywhere on the cover."""
-        if math.isnan(position):
-            position, is_known = self._covers.length_of(cover) / 2.0, False
-        return ForcePlace(
-            cover, position, sd if is_known else anywhere_sd(self._covers, cover, position), is_known=is_known
-        )
+            known = ForcePlace(contact.cover, contact.position, sd, is_known=True)
+            self._last = None if math.isnan(contact.position) else known
+        if self._last is not None:
+            return [self._last]
+        places = []
+        for cover in covers.names if contact.cover and not axis.cover else [axis.cover or parameters.contact_cover]:
+            is_touched = cover == contact.cover and math.isnan(contact.position)
+            middle = covers.length_of(cover) / 2.0
+            position = parameters.contact_position if cover == parameters.contact_cover else middle
+            places.append(ForcePlace(cover, position, anywhere_sd(covers, cover, position), is_touched=is_touched))
+        return places
 
 
 def slid_position(covers: Covers, cover: str, position: float, way: float) -> float:
@@ -132,14 +127,3 @@ def pinned_position(command: ForceCommand | None) -> tuple[str, float] | None:
 def torque_of_position(force: Triple, position: float) -> Triple:
     """Torque about the origin of a cover, N m, of a force at a position along it; the inverse of `pinned_position`."""
     return 0.0, -position * force[2], position * force[1]
-
-
-def _rejection(contact: Contact, lean: float) -> str:
-    """Why an estimated position is not used, '' if it is."""
-    if lean > STEEPEST:
-        return (
-            f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "
-            f"position is estimated well up to {math.degrees(STEEPEST):.0f} deg, and not on the end of a link; "
-            "pin the position (contact_source, or the torque of the command); until then the last position is used"
-        )
-    return ""

@@ -115,8 +115,10 @@ class ForceAxis(NamedTuple):
         return length(self.sense * torque_sd)
 
     def unexplained(self, torques: Array) -> float:
-        """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
-        return _unexplained(self.precision, self.press, torques)
+        """chi^2 of torques of the world on the joints (n,), N m, that no press along the direction explains."""
+        weighted = self.precision.dot(torques)
+        is_pressed = float(self.press.dot(weighted)) < 0.0
+        return _unexplained(self.precision, self.press, torques) if is_pressed else float(torques.dot(weighted))
 
     def changed(self, change: Array) -> float:
         """The same of a change of the torques (n,), N m, at the same position."""

@@ -159,11 +159,6 @@ class ForceLoop:
         return next(iter(self.events), OBEYED)
 
     @property
-    def fallback(self) -> str:
-        """Why the estimated contact position is not used, '' if it is or if no contact is detected."""
-        return self._run.fallback
-
-    @property
     def is_advised(self) -> bool:
         """Whether the event of a refused force has what would help: it is looked for over several periods."""
         return "searched" in self._run.ways
@@ -291,22 +286,23 @@ class ForceLoop:
         run = self._run
         if task is None:
             return
-        places = [self._place(task, axis, contact, one.place) for axis, one in zip(task.axes, run.axes, strict=True)]
-        axes = self._axes.of(self._q, task, places, [one.side for one in run.axes])
-        for one, axis in zip(run.axes, axes, strict=True):
-            one.now = axis
+        places = [self._places(task, axis, contact, one.place) for axis, one in zip(task.axes, run.axes, strict=True)]
+        knowledge, sides = self._knowledge, [one.side for one in run.axes]
+        links = max(map(len, places))
+        each = zip(*(at * (links // len(at)) for at in places), strict=True)
+        axes = zip(*(self._axes.of(self._q, task, at, sides) for at in each), strict=True)
+        for one, axis, at in zip(run.axes, axes, places, strict=True):
+            one.on_links = knowledge.among(self._q, axis[: len(at)], contact)
 
-    def _place(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> ForcePlace:
+    def _places(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> list[ForcePlace]:
         lean = 0.0
         if axis.joint >= 0:
-            return ForcePlace("", 0.0, 0.0)
+            return [ForcePlace("", 0.0, 0.0)]
         if contact.cover and axis.position is None:
             direction = self._axes.rotation(self._q, task.frame).dot(np.array(axis.direction))
             along = self._axes.forces.link_axis(self._q, contact.cover)
-            lean = math.asin(min(abs(float(direction.dot(along))), 1.0))
-        place = memory.step(axis, contact, lean, self.parameters)
-        self._run.fallback = place.rejection
-        return place
+            lean = abs(float(direction.dot(along)))
+        return memory.step(axis, contact, lean, self.parameters)
 
     def _watch(self, contact: Contact, is_led: bool, dt: float) -> list[Event]:
         """What is known of each axis, and what its watch reports."""
@@ -317,15 +313,15 @@ class ForceLoop:
         run.judge(self._q, self._measurement, forces)
         knowledge = self._knowledge
         for one in run.axes:
-            one.known = knowledge.of(self._q, one.now, contact)
+            one.known = knowledge.of(self._q, one.on_links)
         run.move(moved, forces, self._q)
         found: list[Event] = []
         if run.is_moving:
             found.append(holding(Code.REFUSED, "moved_fast", speed=FORCE.fast))
         is_led = is_led or not all(one.now.is_force for one in run.axes)
-        covers = {one.now.place.cover for one in run.axes if one.now.place}
+        covers = {one.of.cover for one in run.axes if one.now.place}
         probable = contact.probability >= own.link_probability_limit
-        touched = contact.cover if covers and probable and contact.cover not in covers else ""
+        touched = contact.cover if covers and probable and not covers & {"", contact.cover} else ""
         for one in run.axes:
             axis, known = one.now, one.known
             if not (axis.is_force and axis.desired):
@@ -388,10 +384,8 @@ class ForceLoop:
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
         if velocity is not unlimited:
             limits += self._at_ends(unlimited, velocity)
-        effort = [0.0] * len(q)
-        if axes and not holds:
-            fed = self._fed()
-            effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces else fed.tolist()
+        fed = self._fed(holds)
+        effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces and not holds else fed.tolist()
         return velocity, effort, limits
 
     def _hold_at(self, found: Sequence[Event]) -> Array:
@@ -511,7 +505,7 @@ class ForceLoop:
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _fed(self) -> Array:
+    def _fed(self, holds: bool) -> Array:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
         The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
@@ -519,12 +513,15 @@ class ForceLoop:
         own, fed = self.parameters, np.zeros(len(self._q))
         for one in self._run.axes:
             axis = one.now
-            if axis.is_force:
+            if axis.is_force and not holds:
                 fed += own.force_feedforward * axis.desired * axis.along
-                if self._run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
-                    if math.isnan(one.wound_up):
-                        one.wound_up = one.known.force * own.is_estimated
-                    fed += ((1.0 - own.force_feedforward) * one.rising - one.wound_up) * axis.along
+            if self._run.is_touching and axis.is_force and axis.place is not None and not axis.is_joint:
+                if holds or not axis.place.is_known:
+                    one.wound_up = math.inf
+                    continue
+                if not math.isfinite(one.wound_up):
+                    one.wound_up = one.known.force * (own.is_estimated or one.wound_up == math.inf)
+                fed += ((1.0 - own.force_feedforward) * one.rising - one.wound_up) * axis.along
         return fed
 
     def _watch_motions(

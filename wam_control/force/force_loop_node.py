@@ -197,10 +197,6 @@ class ForceLoopNode:
         """What applies in place of parameters that the guard does not accept; '' where it accepts all."""
         return self._loop.lowered
 
-    def diagnostics(self) -> dict[str, str]:
-        """Why the estimated contact position is not used."""
-        return {"estimated contact position not used": self._loop.fallback or "-"}
-
     def tare(self) -> Answer:
         """Take the present external torques as zero."""
         reason = self._loop.tare()

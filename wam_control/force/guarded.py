@@ -45,8 +45,8 @@ def guarded(
     if contacts:
         together = [tuple(contacts)]
     elif any(axis.is_joint and axis.is_force for axis in axes):
-        place = ContactPlace(forces.covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
-        together = [(one,) for one in supervision.contacts(q, place.cover, place.position, place.position_sd)]
+        places = ContactPlace(forces.covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
+        together = [(one,) for place in places for one in supervision.contacts(q, *place[:3])]
     else:
         return []
     n = len(q)

@@ -14,6 +14,8 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing
 from wam_control.force.thresholds import FORCE
 from wam_description.signals import Contact
 
+Links = list[tuple[float, CommandedAxis]]
+
 
 class Knowledge:
     """What is known in one period of the forces of a command.
@@ -29,18 +31,45 @@ class Knowledge:
     def __init__(self, run: CommandRun, torques: WorldTorques, forces: ForceAxes, own: ForceLoopParameters) -> None:
         self._run, self._torques, self._forces, self._own = run, torques, forces, own
 
-    def of(self, q: Sequence[float], axis: CommandedAxis, contact: Contact) -> Belief:
-        """What is known of the force along an axis in a pose (n,), rad, with an estimated contact."""
-        return self._among_links(q, axis, self.whole(q, axis), contact)
+    def among(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> Links:
+        """The same axis on each link that may be touched, with the probability of that, the largest first.
+
+        It is that of any contact there, less where no force that presses as commanded explains the torques.
+        """
+        able = [axis for axis in axes if axis.sensed and axis.sensed.force_sd < math.inf]
+        if len(able) < 2:
+            return [(1.0, (able or axes)[0])]
+        torques, logs = self._torques.now, []
+        for axis in able:
+            assert axis.place is not None
+            there = self._forces.axis(q, axis.place.pressed(axis.direction, axis.force(torques)))
+            chance = contact.probability
+            if axis.place.cover != contact.cover:
+                chance = (1.0 - chance) / (len(axes) - 1)
+            logs.append(math.log(max(FORCE.negligible, chance)) - 0.5 * there.unexplained(torques))
+        chances = np.exp(np.array(logs) - max(logs))
+        return sorted(zip((chances / chances.sum()).tolist(), able, strict=True), key=lambda one: -one[0])
+
+    def of(self, q: Sequence[float], on_links: Links) -> Belief:
+        """What is known of a force in a pose (n,), rad: on one of several links, its variance is that of a mixture."""
+        (probability, axis), *others = on_links
+        known = self.whole(q, axis)
+        variance = probability * known.errors.place**2
+        for chance, other in others:
+            there = self._as_placed(other)
+            # a harder press shows which link it is
+            apart = there.force - known.force if known.force >= axis.desired else 0.0
+            variance += chance * (there.sd**2 + probability * apart**2)
+        return known._replace(errors=known.errors._replace(place=math.sqrt(variance)))
 
     def whole(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
         """What is known of a force, with the errors that the whole commanded force will have."""
         known, place = self._as_placed(axis), axis.place
-        if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
+        if place is None or place.is_pinned or known.force >= axis.desired or place.is_touched:
             return known
-        if abs(float(axis.direction.dot(self._forces.link_axis(q, place.cover)))) > math.sin(STEEPEST):
+        if abs(float(axis.direction.dot(self._forces.link_axis(q, place.cover)))) > STEEPEST:
             return known  # nor will it be known
-        # what is touched shows where, and the better the harder it is pressed
+        # all but what no torque shows will be known, and the better the harder the arm presses
         sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
         place = place._replace(position_sd=max(sd, self._own.contact_position_sd))
         touched = axis._replace(sensed=self._forces.axis(q, place.pressed(axis.direction, axis.desired)))
@@ -56,20 +85,3 @@ class Knowledge:
             pressed = sensing_of(own).torque_fraction * axis.desired * axis.sensed.press
             torques = torques._replace(sd=np.hypot(run.still_sd, pressed))
         return belief(axis, size, torques, own, run.is_touching, run.resting, run.shaking.swing(axis, own))
-
-    def _among_links(self, q: Sequence[float], axis: CommandedAxis, known: Belief, contact: Contact) -> Belief:
-        """The same where it is not known which link is touched: the variance of the place is that of a mixture."""
-        place, forces = axis.place, self._forces
-        is_sure = not contact.cover or contact.probability >= self._own.link_probability_limit
-        if place is None or place.is_pinned or place.is_known or is_sure:
-            return known
-        covers, place_sd, probability = forces.covers, known.errors.place, contact.probability
-        for name, length in zip(covers.names, covers.length, strict=True):
-            if name != place.cover:
-                other = place._replace(cover=name, position=FORCE.middle * length)
-                there = axis._replace(sensed=forces.axis(q, other.pressed(axis.direction, axis.desired)))
-                assert there.sensed is not None
-                apart = there.force(self._torques.now) - known.force
-                spread = probability * known.errors.place**2 + (1.0 - probability) * there.sensed.place_sd**2
-                place_sd = max(place_sd, math.sqrt(spread + probability * (1.0 - probability) * apart**2))
-        return known._replace(errors=known.errors._replace(place=place_sd))
