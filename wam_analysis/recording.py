@@ -63,7 +63,7 @@ class AnalysedRecording:
     def duration(self) -> float:
         """Length of what was recorded of the arm, s: from the first to the last stamp, or log time without stamps."""
         if self.is_foreign:
-            return float(np.ptp([one.time[[0, -1]] for one in self.sources if len(one.time)] or 0.0))
+            return float(np.ptp([one.time[[0, -1]] for one in self.sources]))
         prefix = f"{self.namespace}/"
         own = [one for name, one in self.bag.topics.items() if name.startswith(prefix) and len(one.log_time_ns)]
         stamped = [one.stamp_ns for one in own if isinstance(one, STAMPED) and len(one.stamp_ns)]

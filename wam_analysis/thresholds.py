@@ -14,7 +14,7 @@ class ShaftThresholds:
     shortest_phase: float = 0.01  # s; a shorter stick or slip is chatter
     window: float = 0.03  # s over which friction is averaged
     noisy: float = 6.0  # standard deviations of the noise of a velocity: a joint that is slower is at rest
-    far: float = 20.0  # resolutions of a position, or seconds at the speed `joint_rest`: who moves so far has moved
+    far: float = 20.0  # resolutions of a position: who moves so far has moved
     brief: float = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
     turns: float = 0.8  # of the rests of such a joint have motion to the other side behind them
     window_samples: int = 6  # in that window
@@ -49,7 +49,8 @@ class ShaftThresholds:
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1
     limited: float = 0.1  # of the time, in which an effort is exactly at its bounds
-    agree: float = 0.2  # by which a recorded velocity may differ from the rate of the position
+    agree: float = 0.1  # by which a recorded velocity may differ from the rate of the position
+    late: float = 0.02  # of a velocity, by which a delay changes it: less is not seen in the friction
     way: float = 1.0  # s, in which they are compared: longer than a velocity is late, shorter than an encoder slips
     least_work: float = 1e-3  # J below which no efficiency is given
     release: int = 200_000_000  # ns after the brakes were released

@@ -15,13 +15,13 @@ from wam_analysis.findings.repetition import repetition_section, spectrum_sectio
 from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
 from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
-from wam_analysis.findings.topics import topics_section
+from wam_analysis.findings.topics import topics_section, unread
 from wam_analysis.foreign.reading import foreign_bag
 from wam_analysis.foreign.tables import RENAMED, UNUSED, series_of_csv, series_of_frame, table_bag
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
-from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
+from wam_bag.bag import Bag, BagError, read
 from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
@@ -160,6 +160,9 @@ def analyse_bag(
     sections : which are made; all if empty.
     """
     recording = AnalysedRecording(bag, namespace, given)
+    if recording.is_foreign and not recording.sources:
+        why = " ".join(unread(bag)) or "nothing in it can be analysed, for each topic has too few messages"
+        raise BagError(f"{bag.path}: {why}")
     made = []
     for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
         if (section := make(recording)) is not None:
@@ -192,11 +195,10 @@ def _line(title: str, found: list[tuple[str, str]], silent: str) -> str:
 
 def _foreign_line(recording: AnalysedRecording) -> str:
     """What another robot's recording is."""
-    bag = recording.bag
-    joints = {name for one in bag.topics.values() if isinstance(one, JointColumns) for name in one.names}
-    wrenches = sum(isinstance(one, WrenchColumns) for one in bag.topics.values())
-    held = [counted(len(joints), "joint"), *([counted(wrenches, "wrench topic")] if wrenches else [])]
-    unused = [title for title, kind in bag.types.items() if kind == UNUSED]
+    joints = {one.name for one in recording.sources if one.is_joint}
+    wrenches = {one.topic for one in recording.sources if not one.is_joint}
+    held = [counted(len(joints), "joint"), *([counted(len(wrenches), "wrench topic")] if wrenches else [])]
+    unused = [title for title, kind in recording.bag.types.items() if kind == UNUSED]
     line = f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
     return f"{line} Not used: {'; '.join(unused)}; rename each that you need to {RENAMED}." if unused else line
 

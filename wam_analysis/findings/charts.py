@@ -132,10 +132,7 @@ def _envelope(time: Numbers, value: Numbers, most: int) -> tuple[Numbers, Number
     time, value : (n,).
     most : points, an even number.
     """
-    n = len(time)
-    if n <= most:
-        return time, value
-    edges = np.linspace(0, n, most // 2 + 1).astype(np.int64)
+    edges = np.linspace(0, len(time), most // 2 + 1).astype(np.int64)
     filled = np.where(np.isfinite(value), value, np.nan)
     low = np.fmin.reduceat(filled, edges[:-1])
     high = np.fmax.reduceat(filled, edges[:-1])

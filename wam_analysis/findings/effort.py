@@ -1,14 +1,13 @@
 """Section about friction and inertia of the joints of another robot, from their effort."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import rest_speed
-from wam_analysis.foreign.sources import Piece, Source, differentiated, pieces, rests
+from wam_analysis.foreign.sources import Piece, Source, pieces, rests, velocity_fit
 from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -90,15 +89,14 @@ def contradiction(source: Source) -> str:
     """
     if not {"position", "velocity"} <= source.values.keys() or rests(source):
         return ""
-    some = pieces(source, "position", "velocity")
-    factor = _velocity_factor(some)
-    if math.isfinite(factor):
+    factor, _ = velocity_fit(source)
+    if abs(factor - 1.0) > SHAFT.agree:
         return (
             f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "
             "sign"
         )
     unit = source.units["position"]
-    for piece in some:
+    for piece in pieces(source, "position", "velocity"):
         if (lost := _lost_way(piece)) is not None:
             begin, moved, by = lost
             return (
@@ -129,24 +127,6 @@ def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
         return None
     worst = int(np.argmax(excess))
     return float(time[worst]), float(moved[worst]), float(by[worst])
-
-
-def _velocity_factor(some: Sequence[Piece]) -> float:
-    """Recorded velocity over the rate of the position, where that moves; NaN where the two agree or it does not move.
-
-    It is 0 where the velocity is zero, and below zero where its sign is swapped.
-    """
-    rates, speeds = [], []
-    for piece in some:
-        rate, sd = differentiated(piece.time, piece.values["position"])
-        moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * sd)
-        rates.append(rate[moves])
-        speeds.append(piece.values["velocity"][moves])
-    rate, speed = (np.concatenate(parts) if parts else np.zeros(0) for parts in (rates, speeds))
-    if len(rate) < SHAFT.fewest_samples:
-        return math.nan
-    factor = float(rate @ speed / (rate @ rate))
-    return math.nan if abs(factor - 1.0) <= SHAFT.agree else factor
 
 
 def _is_known(found: Friction) -> bool:
@@ -192,10 +172,6 @@ def friction(source: Source) -> tuple[Friction, float]:
     own, noise = _own_acceleration(velocity, sd, load, rest, width, period)
     one_frequency = has_weight and own < SHAFT.apart
     found, shift = (trial.fit(0), 0) if one_frequency else trial.best()
-    if shift and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
-        rates = [part for piece in some for part in (differentiated(piece.time, piece.values["position"])[0], blank)]
-        by_rate = trial._replace(velocity=np.concatenate(rates)).best()
-        found, shift = min((found, shift), by_rate, key=lambda one: one[0].residual)
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 

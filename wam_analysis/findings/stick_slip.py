@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests
-from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
+from wam_analysis.foreign.sources import Piece, Source, is_still, pieces, rests
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, with_sticks, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT
 from wam_bag.arrays import Mask, Numbers, Rows
@@ -88,7 +88,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         rest = rest_speed(piece, least)
         period = float(piece.time[1] - piece.time[0])
         least_rows = max(1, round(SHAFT.shortest_phase / period))
-        phases = stick_slip_phases(piece.values["velocity"], rest, least_rows)
+        phases = _still(piece, stick_slip_phases(piece.values["velocity"], rest, least_rows), least)
         total += len(piece.time)
         if _only_turns(phases, piece.values["velocity"]):
             slips, is_turning = slips + 1, True
@@ -115,9 +115,17 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
 
 def hidden_motion(source: Source) -> float:
     """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
-    position = source.only("position").values.get("position", np.zeros(1))
-    distance = float(np.ptp(position))
-    return distance if distance > SHAFT.far * max(resolution(position), SHAFT.joint_rest) else 0.0
+    distance = float(np.ptp(source.only("position").values.get("position", np.zeros(1))))
+    return distance if distance > SHAFT.joint_rest * SHAFT.way and not rests(source) else 0.0
+
+
+def _still(piece: Piece, phases: Phases, least: float) -> Phases:
+    """The phases without the rests in which the position goes on, as where its rate is too noisy to show it."""
+    if "position" not in piece.values:
+        return phases
+    position, sd = piece.values["position"], piece.noise["position"]
+    kept = [is_still(position[a:b], sd, least * (piece.time[b - 1] - piece.time[a])) for a, b in phases.sticks]
+    return with_sticks(phases.sticks[np.array(kept, np.bool_)], piece.values["velocity"])
 
 
 def _only_turns(phases: Phases, velocity: Numbers) -> bool:

@@ -36,10 +36,8 @@ def topics_section(recording: AnalysedRecording) -> Section:
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
     if computed := [one.label for one in found if _lacks_velocity(one)]:
-        sentences.append(f"The velocity was not recorded and is computed from the position: {', '.join(computed)}.")
-    sentences += [*wrong, *_alike(found), *_unread(bag)]
-    if not found:
-        wrong += _unread(bag) or ["nothing in it can be analysed."]
+        sentences.append(f"The velocity is computed from the position: {', '.join(computed)}.")
+    sentences += [*wrong, *_alike(found), *unread(bag)]
     return Section("happened", "What happened", sentences, wrong=wrong)
 
 
@@ -97,6 +95,7 @@ DONE_TO = {
     Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}; this is removed",
     Treatment.HELD: "{quantity} only repeated in {number} of {of} messages; the others are used",
     Treatment.UNFILLED: "the {quantity} is 0 in every message although the position moves; the rate of that is used",
+    Treatment.LATE: "the {quantity} is about {size}, as by a filter; the rate of the position is used",
     Treatment.SPARSE: "{quantity} in only {share} of {of} messages",
 }
 
@@ -140,7 +139,7 @@ def _alike(found: Sequence[Source]) -> list[str]:
     ]
 
 
-def _unread(bag: Bag) -> list[str]:
+def unread(bag: Bag) -> list[str]:
     """Topics that were not read, and how to."""
     others = {
         name: n for name, n in bag.counts.items() if n and not any(one.split(" ")[0] == name for one in bag.topics)

@@ -96,7 +96,8 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
     if abs(shift) <= STREAM.reset:
         return clock
     side = "behind" if shift > 0 else "ahead of"
-    note = clock.note or f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as of another clock"
+    of = "of another clock" if len(received) > 1 else "of another clock, or sent before the recording"
+    note = clock.note or f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as {of}"
     if float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05)) > STREAM.reset:
         return Clock(clock.times + apart, clock.note or f"{note}; reception times are used")
     return Clock(clock.times + shift, clock.note or f"{note}; they are shifted by this")

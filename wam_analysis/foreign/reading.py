@@ -9,7 +9,7 @@ import numpy as np
 from wam_analysis.foreign.clocks import BILLION, nanoseconds
 from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
-from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
+from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
 from wam_bag.columns import UNNAMED, joint_columns
 
@@ -46,8 +46,6 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
     ValueError
         if a topic, joint or field of the map is not there.
     """
-    if source.types.keys() <= source.unread:
-        raise BagError(f"{source.path} has no topic that is read: {', '.join(map(': '.join, source.types.items()))}")
     kinds = {source.types[name] for name, number in source.counts.items() if number}
     read_as_it_is = {JOINTS, WRENCH, CONTROLLER, *([] if JOINTS in kinds else [INTERFACES])}  # which has the same again
     named = (*given.topics, *given.commands)

@@ -30,6 +30,7 @@ class Treatment(StrEnum):
     MOVED_ZERO = "jumps of the zero"  # were taken off
     HELD = "values held over"  # from the message before: were left out
     UNFILLED = "zeros"  # although the joint moves: were left out
+    LATE = "a filtered velocity"  # was left out
     SPARSE = "messages without"  # the others were used
 
 
@@ -261,18 +262,22 @@ def _is_besides(time: Numbers, own: Mask) -> bool:
 
 
 def alternates(source: Source) -> bool:
-    """Whether a quantity jumps back and forth from message to message, as where two publishers share a topic.
+    """Whether a quantity jumps away and back from message to message, as where two publishers share a topic.
 
-    No motion does: it would have to be faster than 0.47 of the rate of the messages.
+    No motion does: it would have to be faster than 0.45 of the rate of the messages.  A force may, in some messages.
     """
     for quantity in source.values:
         values = source.only(quantity).values[quantity]
         if len(values) < SHAFT.fewest_samples:
             continue
-        once, twice = (float(np.median(np.abs(values[n:] - values[:-n]))) for n in (1, 2))
-        if once > STREAM.alternates * twice and once > STREAM.loud * np.finfo(float).eps * float(
-            np.max(np.abs(values))
-        ):
+        once, twice = (np.abs(values[n:] - values[:-n]) for n in (1, 2))
+        finest = max(
+            float(np.median(twice)),
+            float(np.min(twice, initial=math.inf, where=twice > 0.0)) if np.any(twice) else 0.0,
+            STREAM.loud * np.finfo(float).eps * float(np.max(np.abs(values))),
+        )
+        away = np.minimum(once[1:], once[:-1]) > STREAM.alternates * np.maximum(twice, finest)
+        if np.mean(away) > (STREAM.repeated / 2.0 if quantity == "position" else 0.5):
             return True
     return False
 
@@ -308,9 +313,6 @@ def _treated(one: Source) -> Source:
     """The source without wraps and jumps of the zero, and with what is known of its gaps."""
     values, treated = dict(one.values), list(one.treated)
     is_measured = {"position", "velocity"} <= values.keys() and not one.is_command
-    if is_measured and not np.any(np.nan_to_num(values["velocity"])) and not rests(one):
-        del values["velocity"]
-        treated.append(Treated(Treatment.UNFILLED, "velocity", len(one.time), len(one.time)))
     for quantity, value in values.items():
         if not one.is_command and (number := int(np.sum(held := _held_over(value)))):
             values[quantity] = np.where(held, math.nan, value)
@@ -331,6 +333,11 @@ def _treated(one: Source) -> Source:
             whole = np.cumsum(jumps)[row_at(shown.time, one.time)]
             values["position"] = values["position"] - whole
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
+    factor, lag = velocity_fit(one._replace(values=values)) if is_measured and not rests(one) else (math.nan, 0.0)
+    if lag or not factor:
+        del values["velocity"]
+        what = (Treatment.LATE, "delay of the velocity") if lag else (Treatment.UNFILLED, "velocity")
+        treated.append(Treated(*what, len(one.time), len(one.time), lag))
     return one._replace(values=values, treated=tuple(treated))
 
 
@@ -485,7 +492,15 @@ def resolution(value: Numbers) -> float:
 def rests(source: Source) -> bool:
     """Whether a joint never moved, by its position: an encoder may flicker between counts."""
     position = source.only("position").values.get("position", np.zeros(0))
-    return len(position) > 0 and float(np.ptp(position)) <= SHAFT.far * resolution(position)
+    if not len(position):
+        return False
+    sd = resolution(position)
+    return is_still(position, sd) and float(np.ptp(position)) <= SHAFT.far * sd
+
+
+def is_still(position: Numbers, sd: float, way: float = 0.0) -> bool:
+    """Whether a position is for most of the time in one place, but for its noise and a way."""
+    return bool(np.ptp(np.percentile(position, (5.0, 95.0))) <= SHAFT.noisy * sd + way)
 
 
 def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
@@ -511,6 +526,29 @@ def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
         inner = np.convolve(position, k / (float(k @ k) * period), "valid")
         slope = np.pad(inner, half, "edge")
     return slope, _of_slope(sd, half)
+
+
+def velocity_fit(source: Source) -> tuple[float, float]:
+    """Recorded velocity over the rate of the position, and its delay, s, where that counts, else 0.
+
+    The factor is NaN where the position does not move, and below zero where the sign is swapped.
+    """
+    parts = [np.zeros((0, 3))]
+    for piece in pieces(source, "position", "velocity"):
+        rate, sd = differentiated(piece.time, piece.values["position"])
+        moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * sd)
+        columns = np.column_stack([piece.values["velocity"], rate, np.gradient(rate, piece.time)])
+        parts.append(columns[moves])
+    velocity, rate, change = np.vstack(parts).T
+    if len(rate) < SHAFT.fewest_samples:
+        return math.nan, 0.0
+    columns = np.column_stack([rate, change])
+    now, before = np.linalg.lstsq(columns, velocity, rcond=None)[0]
+    kept, lost = np.linalg.norm(columns * (now, before), axis=0) / np.linalg.norm(rate)
+    factor = math.copysign(math.hypot(kept, lost), now)
+    lag = math.atan2(lost, kept) * float(np.linalg.norm(rate) / np.linalg.norm(change)) if before < 0.0 else 0.0
+    is_late = abs(factor - 1.0) <= SHAFT.agree and lost > SHAFT.late and lag > float(np.median(np.diff(source.time)))
+    return factor, lag * is_late
 
 
 def _of_slope(sd: float, half: int) -> float:

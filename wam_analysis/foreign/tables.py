@@ -18,10 +18,10 @@ from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
 from wam_bag.columns import JOINT_FIELDS, joint_names
 
-TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](.*)[\])]\s*)?")  # and the unit behind it
+TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](?!\d+[\])])(.*)[\])]\s*)?")  # and the unit behind it; q[0] has none
 ABOVE = re.compile(r"#|sep=")  # begins a line above the titles
 ZONE = re.compile(r"(Z|[+-]\d\d:\d\d)$")  # of a time of day, behind it
-DELIMITERS = ",;\t"
+DELIMITERS = ",;\t|"  # or blanks, if the titles have none of these
 NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was not recorded
 COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
@@ -45,9 +45,10 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         raise BagError(f"{path} cannot be read: {reason}") from error
     while len(lines) > 1 and ABOVE.match(lines[0]) and not lines[1].lstrip(' "+-.')[:1].isdigit():
         del lines[0]  # a comment above the titles, which may begin with '#', too, or what names the delimiter
-    head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
-    if not rows:
+    if len(lines) < 2:
         raise BagError(f"{path} has no row below the names of its columns")
+    delimiter = max(DELIMITERS, key=lines[0].count) if any(map(lines[0].count, DELIMITERS)) else " "
+    head, *rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
     if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
@@ -115,7 +116,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     if not topics:
         raise BagError(f"{path} has the columns {', '.join(map(str, series))}; rename each that you need to {RENAMED}")
     types = {topic: COMMAND if topic.endswith("_command") else "table" for topic in topics}
-    types |= {str(one): UNUSED for one in series if str(one) not in used}
+    types |= {str(one): UNUSED for one in series if str(one) not in used and str(one).strip()}
     return checked(Bag(path, topics, types, {}, {}, dict.fromkeys(topics, len(times))), given), given
 
 
@@ -252,7 +253,7 @@ def _numbers(column: Any) -> Numbers:
     found = [_number(one.replace(of_thousands, "")) for one in texts]
     for text, number in zip(texts, found, strict=True):
         if math.isnan(number) and text.lower() not in NO_NUMBER:
-            raise BagError(f"a cell has '{text}', which is no number; leave it empty")
+            raise BagError(f"a cell has '{text}', which is no number; leave it empty, or give each number a column")
     return np.array(found)
 
 

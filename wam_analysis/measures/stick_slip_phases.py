@@ -62,18 +62,22 @@ def without_turns(phases: Phases, velocity: Numbers, rest: float) -> Phases:
     velocity : (n,), rad/s or m/s.
     rest : speed up to which it was counted as at rest.
     """
-    ends = dict(zip(phases.slips[:, 1].tolist(), phases.directions.tolist(), strict=True))
-    begins = dict(zip(phases.slips[:, 0].tolist(), phases.directions.tolist(), strict=True))
     turns = np.array(
         [
-            a in ends
-            and b in begins
-            and np.percentile(np.abs(velocity[a:b]), 50.0 if ends[a] != begins[b] else 5.0) > SHAFT.passing * rest
+            a > 0
+            and b < len(velocity)
+            and np.percentile(np.abs(velocity[a:b]), 50.0 if velocity[a - 1] * velocity[b] < 0.0 else 5.0)
+            > SHAFT.passing * rest
             for a, b in phases.sticks.tolist()
         ],
         dtype=np.bool_,
     )
+    return with_sticks(phases.sticks[~turns], velocity)
+
+
+def with_sticks(sticks: Rows, velocity: Numbers) -> Phases:
+    """The phases of a velocity with these sticks alone."""
     still = np.zeros(len(velocity), dtype=np.bool_)
-    for a, b in phases.sticks[~turns]:
+    for a, b in sticks:
         still[a:b] = True
     return _phases(still, velocity)
