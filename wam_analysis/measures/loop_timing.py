@@ -34,12 +34,10 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
 
     Parameters
     ----------
-    stamp : (n,), ns, as the messages bear it.
+    stamp : (n,), ns, as the messages bear it, two at least.
     received : (n,), ns, reception times by the clock of the recorder; None if they have no meaning,
         as in lockstep bags, whose log times are the stamps.
     """
-    if len(stamp) < 2:
-        return StampTiming(math.nan, 0, math.nan, 0, math.nan, math.nan)
     steps = np.diff(stamp)
     forward = steps[steps > 0]
     period = float(np.median(forward)) if len(forward) else math.nan
