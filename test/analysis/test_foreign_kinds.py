@@ -23,7 +23,6 @@ NOTHING = topic_map([], [], [], [], [])
 DEGREES = topic_map([], [], [], [], ["position=deg", "velocity=deg/s"])
 MAPPED = topic_map(["/state"], [], [], ["name=state.name", "position=state.position", "stamp=time"], [])
 DRY, VISCOUS = 1.5, 0.8
-COUNT = 2.0 * math.pi / 4096.0  # of an encoder
 
 
 def sqlite(path: Path, sent: list[Sent]) -> Path:
@@ -240,7 +239,6 @@ def few_cycles() -> list[Case]:
 
 
 def in_steps(frequency: float, size: float, step: float) -> list[Sent]:
-    """Positions alone, in steps."""
     sent = one("/joint_states", 50.0, frequency, size, lambda q: step * np.rint(q / step + 0.23), 60.0)
     return without(sent, lambda _: True, "velocity", "effort")
 
@@ -263,7 +261,7 @@ def still() -> list[Case]:
         Case(
             "a cycle of four counts",
             by_rosbags,
-            in_steps(0.3, 2.0 * COUNT, COUNT),
+            in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
             {"a: frequency": 0.3},
             "",
             NOTHING,
