@@ -21,8 +21,8 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the estimate assumes a force across this link; a force along the tube of this link, or of the one "
-    "before it, explains the torques as well",
+    Reason.ALONG: "perhaps the force acts along a tube: one along this link, or along the link before it, gives the "
+    "same torques as the estimated one across this link",
     Reason.PAYLOAD: "a picked-up payload may also explain the torques; its probability is what the links lack to 1",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "the arm is braked",
@@ -43,7 +43,7 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     "place": ("the contact position", PINNED),
     "resting": (
         "a load that is not in the model",
-        "end the command and tare in free space ('wam call tare'), or declare the load of a real arm (arm.payload)",
+        "end the command and tare in free space ('wam call tare'), or declare the load (arm.payload)",
     ),
     "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
     "slow_arm": (

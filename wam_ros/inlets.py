@@ -72,7 +72,7 @@ class PublisherClaim:
         names = sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found}) or [UNKNOWN]
         if len(found) == count and not any(UNKNOWN in name for name in names):
             self._named = count, names
-        return [name if UNKNOWN not in name else "a node without a name" for name in names]
+        return [name if UNKNOWN not in name else "a node whose name is not known yet" for name in names]
 
 
 class Inlets:

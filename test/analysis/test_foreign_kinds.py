@@ -231,7 +231,7 @@ def called_as_commands() -> list[Case]:
 def few_cycles() -> list[Case]:
     return [
         Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
-             ("slower motion was not looked for;", "varied by 0.8 rad.", f"recording: {seconds:g} s"))
+             ("No vibration above", "varied by 0.8 rad.", f"recording: {seconds:g} s"))
         for write, rate, frequency, seconds in (
             (by_rosbags, 250.0, 0.4, 10.0), (sqlite, 100.0, 0.1, 30.0), (ros1, 50.0, 0.03, 100.0),
         )

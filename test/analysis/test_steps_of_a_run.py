@@ -513,7 +513,7 @@ def test_good_run_has_a_good_verdict():
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | correct link: YES (98 %) | "
         "position within 4 cm: YES (2.0 cm), not known for contact 2 | "
-        f"false contact for at most 10 % of the time in which nothing touches: YES (1.4 %) | {NO_LIMIT}"
+        f"false contact for at most 10 % of the time without a contact: YES (1.4 %) | {NO_LIMIT}"
     )
 
 
@@ -640,7 +640,7 @@ def test_under_the_brakes_no_contact_is_missed_where_the_motors_alone_are_observ
 def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
     recording = Played()
     recording.set(recording.estimated, 1.6, 1.6 + seconds, "inner_link", (0.0, 5.0, 0.0), 0.2)
-    assert f"of the time in which nothing touches: {answer}" in verdict(recording.summary())
+    assert f"of the time without a contact: {answer}" in verdict(recording.summary())
     contact = section_of(recording.bag(), "contact")
     listed, other = (contact.wrong, contact.shows)[:: -1 if answer.startswith("YES") else 1]
     assert "False contacts: 1 of 6." in listed
@@ -652,7 +652,7 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording = Played()
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
-    answer = "of the time in which nothing touches: NOT EVALUATED, only 200 ms, which the end of a contact may take"
+    answer = "of the time without a contact: NOT EVALUATED, only 200 ms, which the end of a contact may take"
     assert answer in verdict(recording.summary())
 
 

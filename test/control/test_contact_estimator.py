@@ -355,15 +355,13 @@ def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> Non
         found[name] = (estimator.estimate(), estimator.zero(), estimator.estimate())
     assert found["none"][0].in_contact
     before, reason, after = found["declared"]
-    assert not before.in_contact
-    assert reason == ""
+    assert (before.in_contact, reason) == (False, "")
     assert before.torque_sd[3] > 3.0 * after.torque_sd[3]
     assert abs(after.external_torques[3]) < 0.1 * abs(before.external_torques[3])
 
 
 @pytest.mark.slow
 def test_from_the_motors_a_payload_is_tracked_and_not_tared() -> None:
-    """Taken twice, as the tracked payload and as the tared one, its weight was a contact at once."""
     arm = RigidArm(carrying(0.3), (0.2, -1.05, 0.3, 0.5), friction=0.0)
     observer = dataclasses.replace(MOTORS.observer, payload=(0.0, 0.5), mass_scale=(1.0,) * 4)
     frictionless = dataclasses.replace(observer, friction_scale=0.0)

@@ -74,7 +74,6 @@ def test_the_plant_of_a_task_touches_nothing_and_is_the_true_arm(number: int) ->
 
 @pytest.mark.slow
 def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
-    """Moved along the force by more than the gap the link touches, by less it does not."""
     body = RigidBody(WAM)
     for task in DRAWN[:12]:
         configuration = configured(CONFIGURATION, task)
@@ -88,6 +87,11 @@ def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
             moved = configuration.with_values({"arm.joints.start": q.tolist()})
             driver = Driver(moved.shared, moved.node("driver", DriverParameters))
             assert bool(driver.plant.data.ncon) is touches, (task, distance)
+
+
+@pytest.mark.slow
+def test_a_task_that_tares_during_a_false_contact_is_done() -> None:
+    assert perform(CONFIGURATION, draw(WAM, 7501, 37)).outcome is not TaskEnd.REFUSED
 
 
 def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:

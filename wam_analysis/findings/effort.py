@@ -60,8 +60,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
     doubts += [RECORD] * bool(doubts)
     assumed = (
-        "The effort is explained by friction, inertia, the joint's weight, a drag by the square of the velocity, and "
-        "a delay where it explains more. What is left makes the standard errors larger."
+        "The effort is explained by friction, inertia, the joint's weight, a drag by the square of the velocity and, "
+        "if the fit is better with it, a delay. What is left makes the standard errors larger."
     )
     if alone:
         doubts.append(

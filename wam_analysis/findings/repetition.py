@@ -100,9 +100,9 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
-    span = f"Below {least} nothing was looked for: the longest part without a gap has fewer than five such cycles."
+    span = f"Vibrations below {least} cannot be found: the longest part without a gap is too short."
     ranges = ", ".join(f"{label} varied by {shown(size, unit)}" for unit, (size, label) in varied.items())
-    silent = [] if findings else [f"No vibration above {least}; slower motion was not looked for; {ranges}."]
+    silent = [] if findings else [f"No vibration above {least}; {ranges}."]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 

@@ -194,7 +194,7 @@ def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     part, seconds = traces.false_percent, traces.false_seconds
     if math.isnan(part):
         return []
-    question = f"false contact for at most {TOUCH.false_tolerance:g} % of the time in which nothing touches"
+    question = f"false contact for at most {TOUCH.false_tolerance:g} % of the time without a contact"
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]

@@ -13,7 +13,7 @@ IDEAL = " *"  # after a prediction that leaves out what the stack does on purpos
 LEGENDS = {
     BESIDE: "+-: one standard deviation",
     PREDICTED: "measured | predicted",
-    IDEAL: "* predicted as if nothing slowed the motion on purpose",
+    IDEAL: "* predicted as if the stack did not slow its motions on purpose",
     MARK: "! more than three standard errors from its prediction",
 }
 

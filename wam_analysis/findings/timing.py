@@ -78,7 +78,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
             ]
         if found.missed:
             gap = shown(found.longest_gap, "s")
-            wrong.append(f"{name}: {found.missed} periods without a message, the longest gap {gap}.")
+            wrong.append(f"{name}: {found.missed} missing, the longest gap {gap}.")
     if recording.is_foreign:
         stated = "Every period has its message." if findings else "No stamped topic was recorded."
         return Section("timing", "Timing", wrong or [stated], findings, wrong=wrong)

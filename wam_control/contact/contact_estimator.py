@@ -128,8 +128,14 @@ class ContactEstimator:
         self._is_blind = on and not self._parameters.use_joint_sensors
 
     def zero(self) -> str:
-        """Take the present torques of joint sensors as those of an arm at rest that nothing touches; '' or why not."""
-        return self._observer.zero()
+        """Take the present torques of joint sensors as those of an arm at rest that nothing touches; '' or why not.
+
+        What was taken for a contact is forgotten: its moments have errors that are no longer those of the present one.
+        """
+        reason = self._observer.zero()
+        if not reason:
+            self._fusion.reset()
+        return reason
 
     def reset(self) -> None:
         """Forget all samples."""

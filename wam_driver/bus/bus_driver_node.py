@@ -148,13 +148,9 @@ class BusDriver(ArmDriver):
         return super().estop()
 
     def _confirm_home(self, _: Any) -> Answer:
-        is_taken = self.hardware.confirm_home()
-        return Answer(
-            is_taken,
-            "the zero is set"
-            if is_taken
-            else "refused: the driver is not waiting for the home pose; its status shows what it waits for",
-        )
+        if self.hardware.confirm_home():
+            return Answer(True, "the zero is set")
+        return Answer(False, f"refused: this is not what the driver waits for; {self.advice}".removesuffix("; "))
 
     def destroy_node(self) -> None:
         """Brake, report it, and end when the others have the last messages."""
