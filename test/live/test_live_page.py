@@ -715,7 +715,7 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                     time.sleep(0.03)
                 until(lambda: panel.snapshot.true.cover == "outer_link")
                 until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
-                until(lambda: "you push with" in tab.text())
+                until(lambda: "your hand pushes with" in tab.text())
                 tab.mouse("mouseReleased", x + 288.0, y, False)
                 until(lambda: panel.snapshot.true.cover == "")
                 tab.click("Brake")
