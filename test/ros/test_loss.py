@@ -207,17 +207,17 @@ def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: Net
 
 
 class Slow:
-    """A node whose step does not end before the test lets it."""
+    """A node whose step does not end before a count changes."""
 
     name, parameters = "slow", Nothing
-    may_end: ClassVar[Callable[[], bool]] = lambda: True
+    count: ClassVar[Callable[[], float]] = time.monotonic
 
     def __init__(self, shared: Shared, own: Nothing) -> None: ...
 
     @reaction(Input("joint_states", "position"), outputs=())
     def step(self, inputs: Inputs) -> Outputs:
-        end = time.monotonic() + LONG
-        while not type(self).may_end() and time.monotonic() < end:
+        end, before = time.monotonic() + LONG, type(self).count()
+        while type(self).count() == before and time.monotonic() < end:
             time.sleep(0.001)
         return {}
 
@@ -229,13 +229,12 @@ def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
     stack = Stack(ros, tmp_path, "realtime")
     slow = make(ros, tmp_path, f"{__name__}:Slow", "/wam", changed([*SIX, f"{__name__}:Slow"], timing__mode="realtime"))
     published = slow.outlets.published
-    before = published["status"]
-    monkeypatch.setattr(Slow, "may_end", lambda: published["status"] > before)
+    monkeypatch.setattr(Slow, "count", lambda: published["status"])
     peers, reasons = stack.nodes["velocity_loop"].peers, set[str]()
     hear = peers.hear
     monkeypatch.setattr(peers, "hear", lambda status: [hear(status), reasons.add(peers.held_up(["transform"]))])
     ros.wait(lambda: any(one.startswith("slow was in a step of ") for one in reasons), what="a report from the step")
-    monkeypatch.setattr(Slow, "may_end", lambda: True)
+    monkeypatch.setattr(Slow, "count", time.monotonic)
 
 
 @pytest.mark.parametrize(
