@@ -91,8 +91,9 @@ class BusDriver(ArmDriver):
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
         hardware, timing, publish = self.hardware, self.shared.timing, self.outlets.publish
-        position, velocity, current = hardware.state
-        self._watch(hardware.state)
+        state = hardware.state
+        self._watch(state)
+        position, velocity, current = state
         torque = [i * k for i, k in zip(current, self.shared.arm.motors.torque_constant, strict=True)]
         for stamp in range(self.stamp - (due - 1) * timing.period_ns, self.stamp + 1, timing.period_ns):
             is_outer = timing.is_outer(stamp)
