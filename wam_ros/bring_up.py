@@ -90,7 +90,7 @@ class NodeProcess(Closing):
         place: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         prepare_logging_directory()
-        self._stack = ExitStack()
+        self._entries, self._stack = entries, ExitStack()
         file = self._stack.enter_context(parameter_file(configuration))
         self._command = [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", "--params-file", str(file)]
         self._command += ["-r", f"__ns:=/{namespace.strip('/')}", "--log-level", log_level]
@@ -100,6 +100,11 @@ class NodeProcess(Closing):
     def start(self) -> None:
         """Start the nodes, in a session of their own: Ctrl-C reaches the parent alone, which stops them in order."""
         self._process = subprocess.Popen(self._command, start_new_session=True, env=self._environment)
+
+    @property
+    def nodes(self) -> list[str]:
+        """Names of its nodes."""
+        return [declared(entry).name for entry in self._entries]
 
     @property
     def code(self) -> int | None:
@@ -168,16 +173,14 @@ class Processes(Closing):
     ) -> None:
         names = node_names(configuration)
         self.killed: list[str] = []
-        self.processes: dict[str, NodeProcess] = {}
-        self._nodes: dict[str, list[str]] = {}
-        for group, place in placed_groups(configuration.shared, processes):
-            nodes = [names[entry] for entry in group]
-            self._nodes[", ".join(nodes)] = nodes
-            self.processes[", ".join(nodes)] = NodeProcess(configuration, group, namespace, log_level, place)
+        self.processes = {
+            ", ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
+            for group, place in placed_groups(configuration.shared, processes)
+        }
 
     def nodes_of(self, process: str) -> list[str]:
         """The nodes in a process."""
-        return self._nodes[process]
+        return self.processes[process].nodes
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
@@ -193,7 +196,7 @@ class Processes(Closing):
     @property
     def failures(self) -> list[str]:
         """Nodes that have ended and should not have; why, they have printed themselves."""
-        return [f"{process_of(self._nodes[name])} {_ending(code)}" for name, code in self.ended().items() if code]
+        return [f"{process_of(self.nodes_of(name))} {_ending(code)}" for name, code in self.ended().items() if code]
 
     def close(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
@@ -202,7 +205,7 @@ class Processes(Closing):
         """
         deadline = time.monotonic() + PROCESS_LIMITS.end
         before = self.ended()
-        first = [name for name, nodes in self._nodes.items() if FIRST in nodes]
+        first = [name for name in self.processes if FIRST in self.nodes_of(name)]
         others = [name for name in self.processes if name not in (*first, LAST)]
         if any(code < 0 for code in before.values()):
             for process in self.processes.values():
@@ -233,7 +236,7 @@ class Processes(Closing):
                 LOGGER.warning(f"waiting for the recorder to write the bag, {seconds:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
-        LOGGER.error(f"{process_of(self._nodes[name])} is killed: it {reason}")
+        LOGGER.error(f"{process_of(self.nodes_of(name))} is killed: it {reason}")
         self.killed.append(name)
         self.processes[name].kill()
 
