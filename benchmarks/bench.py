@@ -52,13 +52,13 @@ class Ratio(NamedTuple):
     must: float = math.nan
     aim: float = math.nan
 
-    def of(self, found: Values) -> float:
-        """The ratio in a round."""
-        return found[self.name] / found.get(self.reference, 1.0)
+    def ratios(self, rounds: Sequence[Values]) -> list[float]:
+        """The ratios of the rounds that have it, the least first."""
+        return sorted(found[self.name] / found.get(self.reference, 1.0) for found in rounds if self.name in found)
 
     def row(self, benchmark: str, rounds: Sequence[Values]) -> Row:
         """The median of the rounds, with what is required."""
-        ratios = [self.of(found) for found in rounds if self.name in found]
+        ratios = self.ratios(rounds)
         required, target = (ANY if math.isnan(end) else self._better(end) for end in (self.must, self.aim))
         found = exact(statistics.median(ratios), len(ratios)) if ratios else NONE
         return Row(f"{benchmark}: {self.name}", found, required=required, target=target)
@@ -68,10 +68,9 @@ class Ratio(NamedTuple):
 
     def cells(self, rounds: Sequence[Values]) -> list[str]:
         """Medians of measured value and reference, and the ratio with its ends."""
-        shown = [found for found in rounds if self.name in found]
-        if not shown:
+        if not (ratios := self.ratios(rounds)):
             return [self.name, *["–"] * 3]
-        ratios = sorted(map(self.of, shown))
+        shown = [found for found in rounds if self.name in found]
         both = [statistics.median(found.get(name, 1.0) for found in shown) for name in (self.name, self.reference)]
         middle = f"{statistics.median(ratios):.3g} ({ratios[0]:.3g} to {ratios[-1]:.3g})"
         return [self.name, *(f"{value:.4g}" if self.reference else "" for value in both), middle]
@@ -148,8 +147,8 @@ class BenchmarkStudy(Study[Round, Measured]):
     def score(self, records: Sequence[Measured]) -> Scores:
         """The median of each ratio; a table of each benchmark."""
         rows, tables = [], []
-        for name, own in grouped(records, lambda record: record.benchmark).items():
-            benchmark, rounds = load(name), [record.values for record in own]
+        for name, rounds in _rounds(records).items():
+            benchmark = load(name)
             rows += [ratio.row(name, rounds) for ratio in benchmark.ratios]
             lines = [ratio.cells(rounds) for ratio in benchmark.ratios]
             tables.append(ScoreTable(f"{name}: {benchmark.title}", HEAD, lines))
@@ -157,17 +156,27 @@ class BenchmarkStudy(Study[Round, Measured]):
 
     def panels(self, records: Sequence[Measured]) -> Sequence[Panel]:
         """How the computing time grows from the bare plant to the stack in processes, and the parts of a period."""
-        of = grouped(records, lambda record: record.benchmark)
+        medians = {
+            name: {key: statistics.median(found[key] for found in rounds) for key in rounds[0]}
+            for name, rounds in _rounds(records).items()
+        }
         panels = []
-        if rounds := [record.values for record in of.get("speed", ())]:
+        if speeds := medians.get("speed"):
             names = ["bare plant", *(ratio.name for ratio in load("speed").ratios)]
-            times = {name: 1e3 / statistics.median(found[name] for found in rounds) for name in names}
+            times = {name: 1e3 / speeds[name] for name in names}
             panels.append(_named_points("What each layer adds", "computing time of 1 s of the arm [ms]", times))
-        if rounds := [record.values for record in of.get("parts", ())]:
-            times = {name: statistics.median(found[name] for found in rounds) for name in rounds[0]}
-            largest = dict(sorted(times.items(), key=lambda item: -item[1]))
+        if parts := medians.get("parts"):
+            largest = dict(sorted(parts.items(), key=lambda item: -item[1]))
             panels.append(_named_points("Parts of a period, plain Python", "computing time [us]", largest))
         return panels
+
+
+def _rounds(records: Sequence[Measured]) -> dict[str, list[Values]]:
+    """What was measured in the rounds of each benchmark."""
+    return {
+        name: [record.values for record in own]
+        for name, own in grouped(records, lambda record: record.benchmark).items()
+    }
 
 
 def _named_points(title: str, unit: str, values: Values) -> Panel:
