@@ -173,10 +173,8 @@ class BenchmarkStudy(Study[Round, Measured]):
 
 def _rounds(records: Sequence[Measured]) -> dict[str, list[Values]]:
     """What was measured in the rounds of each benchmark."""
-    return {
-        name: [record.values for record in own]
-        for name, own in grouped(records, lambda record: record.benchmark).items()
-    }
+    of = grouped(records, lambda record: record.benchmark)
+    return {name: [record.values for record in own] for name, own in of.items()}
 
 
 def _named_points(title: str, unit: str, values: Values) -> Panel:
