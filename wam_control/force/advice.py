@@ -5,7 +5,7 @@ A search over the belief of other forces in other poses, a few in each period, s
 
 from collections.abc import Callable, Iterator, Sequence
 
-from wam_control.force.axes import CommandedAxis, TaskAxes
+from wam_control.force.axes import Links, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -20,10 +20,10 @@ Ways = dict[str, Value]
 def tries(
     q: Sequence[float],
     task: TaskCommand,
-    place: ForcePlace,
+    places: Sequence[tuple[float, ForcePlace]],
     axes: TaskAxes,
     joints: Joints,
-    believe: Callable[[Sequence[float], CommandedAxis], Belief],
+    believe: Callable[[Sequence[float], Links], Belief],
     own: ForceLoopParameters,
 ) -> Iterator[Ways]:
     """After each force that is tried, the way where it would be obeyed with a reserve, else nothing; then `searched`.
@@ -32,33 +32,35 @@ def tries(
     ----------
     q : joint angles (n,), rad.
     task : with the one refused force.
-    place : where it acts.
+    places : where it acts on each link that may be touched, with the probability of that, the largest first.
     axes : of tasks of this arm.
     joints : of the arm.
-    believe : what would be known in a pose of a force.
+    believe : what would be known in a pose of a force on these links.
     own : parameters of the force loop.
     """
     (force,) = task.axes
+    place = places[0][1]
     pinned = place._replace(position_sd=own.contact_position_sd, is_pinned=True, is_known=True)
 
-    def is_obeyed(pose: Sequence[float], where: ForcePlace, size: float) -> bool:
-        (axis,) = axes.of(pose, task._replace(axes=(force._replace(value=size),)), [where], [1.0])
-        return FORCE.reserve * believe(pose, axis).doubt <= own.limits.doubt
+    def is_obeyed(pose: Sequence[float], where: Sequence[tuple[float, ForcePlace]], size: float) -> bool:
+        tried = task._replace(axes=(force._replace(value=size),))
+        on_links = [(chance, axes.of(pose, tried, [at], [1.0])[0]) for chance, at in where]
+        return FORCE.reserve * believe(pose, on_links).doubt <= own.limits.doubt
 
     size = force.value or 0.0
     for name, was, angle, pose in _turned(q, joints, own.limits.joint_margin):
-        is_good = is_obeyed(pose, place, size)
+        is_good = is_obeyed(pose, places, size)
         yield {"turn": name, "turn_from": was, "turn_to": angle} if is_good else {}
         if is_good:
             break
     for factor in FORCE.more:
         larger = float(f"{factor * size:.2g}")
-        is_good = larger <= own.force_limit and is_obeyed(q, place, larger)
+        is_good = larger <= own.force_limit and is_obeyed(q, places, larger)
         yield {"more_force": larger} if is_good else {}
         if is_good:
             break
     if not place.is_pinned:
-        yield {"pin": place.position} if is_obeyed(q, pinned, size) else {}
+        yield {"pin": place.position} if is_obeyed(q, [(1.0, pinned)], size) else {}
     yield {"searched": 1.0}
 
 

@@ -63,6 +63,10 @@ class CommandedAxis(NamedTuple):
         return -float((self.along if self.sensed is None else self.sensed.sense).dot(external))
 
 
+# an axis on each link that may be touched, with the probability of that, the largest first
+Links = list[tuple[float, CommandedAxis]]
+
+
 class TaskAxes:
     """Makes the commanded axes of tasks, for one arm.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.advice import Ways
-from wam_control.force.axes import CommandedAxis
+from wam_control.force.axes import CommandedAxis, Links
 from wam_control.force.belief import UNKNOWN
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.feed_forward import FeedForward
@@ -48,7 +48,7 @@ class AxisRun:
     """
 
     def __init__(self, of: TaskAxis, covers: Covers) -> None:
-        self.on_links: list[tuple[float, CommandedAxis]]
+        self.on_links: Links
         self.known = UNKNOWN
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()

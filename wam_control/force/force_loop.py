@@ -557,16 +557,17 @@ class ForceLoop:
         """With what would help a refused force, which is looked for over several periods."""
         run = self._run
         is_refused = any(event.holds and event.cause == "error" for event in found)
-        if not is_refused or task is None or len(run.axes) > 1 or (place := run.axes[0].now.place) is None:
+        places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)] if run.axes else []
+        if not is_refused or task is None or len(run.axes) > 1 or not places:
             run.search, run.ways = None, {}
             return found
         run.search = run.search or tries(
             self._q,
             task,
-            place,
+            places,
             self._axes,
             self._body.arm.joints,
-            lambda pose, axis: self._knowledge.whole(pose, axis),  # noqa: PLW0108
+            lambda pose, on_links: self._knowledge.of(pose, on_links),  # noqa: PLW0108
             self.parameters,
         )
         for ways in islice(run.search, FORCE.each):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wam_control.force.axes import CommandedAxis
+from wam_control.force.axes import CommandedAxis, Links
 from wam_control.force.belief import Belief, WorldTorques, belief
 from wam_control.force.command_run import CommandRun
 from wam_control.force.contact_place import STEEPEST
@@ -13,8 +13,6 @@ from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.thresholds import FORCE
 from wam_description.signals import Contact
-
-Links = list[tuple[float, CommandedAxis]]
 
 
 class Knowledge:
@@ -53,7 +51,7 @@ class Knowledge:
     def of(self, q: Sequence[float], on_links: Links) -> Belief:
         """What is known of a force in a pose (n,), rad: on one of several links, its variance is that of a mixture."""
         (probability, axis), *others = on_links
-        known = self.whole(q, axis)
+        known = self._whole(q, axis)
         variance = probability * known.errors.place**2
         for chance, other in others:
             there = self._as_placed(other)
@@ -62,7 +60,7 @@ class Knowledge:
             variance += chance * (there.sd**2 + probability * apart**2)
         return known._replace(errors=known.errors._replace(place=math.sqrt(variance)))
 
-    def whole(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
+    def _whole(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
         """What is known of a force, with the errors that the whole commanded force will have."""
         known, place = self._as_placed(axis), axis.place
         if place is None or place.is_pinned or known.force >= axis.desired or place.is_touched:
