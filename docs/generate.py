@@ -319,7 +319,7 @@ def motors_of_today() -> str:
         circuit = today().circuits[i]
         assumed = (motors.static_friction[i], circuit.stiffness)
         rows.append([motor, turns, *(number(values[i]) for values in known), *(f"{value:.3g}" for value in assumed)])
-    head = ["motor", "angle of the motor", "drive inertia [kg m²]", "torque constant [N m/A]",
+    head = ["motor", "motor angle from joint angles", "drive inertia [kg m²]", "torque constant [N m/A]",
             "peak torque [N m]", "continuous torque [N m]", "static friction [N m], assumed",
             "cable stiffness [N m/rad], assumed"]  # fmt: skip
     return markdown(head, rows)

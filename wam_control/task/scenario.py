@@ -38,21 +38,21 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "posture": "the commanded angle of each joint at the end of the step, rad; the arm gets there a little later",
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
-    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force on the world, N, in `base` or in the "
-    "frame of a cover. Optional: `contact_position`, m along the cover, for a force across it in its frame; `rise`, "
-    "its rise time, s",
+    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force of the arm on the world, N. `frame` is "
+    "`base` or a cover. Optional: `contact_position`, m along the cover, only for a force across the cover in its frame; "
+    "`rise`, rise time of the force, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
-    "torque": "the torque of each joint on the world, N m; it is sent as a `task`",
-    "until_force": "force, N; the step ends when a contact with this force is detected; without a contact it fails",
+    "torque": "torque of each joint on the world, N m; the scenario sends it as a `task`",
+    "until_force": "force, N; the step ends when a contact with this force is detected; it fails if there is none",
     "chirp": "`{newtons, from, to}`: adds a sine to `force`, in the same direction. `newtons`: amplitude, N. The "
     "frequency goes from `from` to `to`, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "
     "`contact_position` is in m along the cover, `newtons` in its frame. Optional: `begin` and `end`, s from the start "
     "of the step",
-    "request": "called at the start of the step: `enable`, `disable`, or `tare`; a tare needs half a second of "
-    "rest before it",
-    "set": "`{force_loop: {force_gain: [0.01]}}`: sets *live* parameters of driver or force_loop at the start of the "
-    "step; these may change while the node runs",
+    "request": "called at the start of the step: `enable`, `disable` or `tare`. Before `tare` the arm must be at "
+    "rest for half a second",
+    "set": "`{force_loop: {force_gain: [0.01]}}`: sets parameters of driver or force_loop at the start of the "
+    "step. Only *live* parameters can be set: they may change while the node runs",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
