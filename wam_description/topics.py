@@ -60,20 +60,20 @@ FRICTION_COLUMNS: Final = (
 FORCE_AXIS: Final = {  # columns of the table, and what they mean
     "event": "number of `wam_description.event.Code`; 0 if the command is obeyed",
     "holds": "1 if the arm holds its position because of the event",
-    "doubt": "predicted force error divided by the tolerated one",
+    "doubt": "predicted force error divided by the tolerated force error",
     "tolerance": "tolerated force error, N",
-    "torques": "part of the predicted error: errors of the measured torques, N",
-    "friction": "the same: friction of the surface, N",
-    "place": "the same: position of the contact, N",
-    "resting": "the same: torques that were there before the touch, N",
-    "moving_surface": "the same: a surface that moves ahead of the loop, N",
-    "slow_arm": "the same, N; infinite if the arm reaches the force too slowly",
-    "shaking_arm": "the same: shaking of the arm itself, N",
+    "torques": "part of the predicted force error by errors of the measured torques, N",
+    "friction": "part by friction of the surface, N",
+    "place": "part by the error of the contact position, N",
+    "resting": "part by external torques from before the touch, N",
+    "moving_surface": "part by the lag of the force behind a moving surface, N",
+    "slow_arm": "N; infinite if the arm would reach the force too slowly, else 0",
+    "shaking_arm": "part by vibration of the arm due to the dither, N",
     "force_sd": "standard deviation of the measured force, N; infinite if the force has no lever",
-    "lever": "size of the joint torques per force, m",
-    "apparent_mass": "measured force per acceleration along the force, kg",
+    "lever": "lever arm: norm of the joint torques divided by the force, m",
+    "apparent_mass": "measured force divided by the acceleration along it, in free motion, kg",
     "speed_fraction": "velocity along the force divided by the commanded one, 0 to 1",
-    "position": "position of the contact along the cover, m",
+    "position": "contact position along the cover, m",
     "position_sd": "its standard deviation, m",
 }
 
@@ -209,14 +209,17 @@ TOPICS: Final = (
     _joints(
         "joint_sensors",
         "inner",
-        "joint1..N: joint-side encoder in rad and rad/s; torque by strain gauges in N m, on the link side of the joint "
-        "friction",
+        "joint1..N: angle and velocity from joint-side encoders, rad and rad/s; effort = torque from strain gauges on "
+        "the link side of the joint friction, N m",
         needs_joint_sensors=True,
     ),
     _joints(
-        "joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m", is_viewed=True
+        "joint_states",
+        "outer",
+        "joint1..N: rad, rad/s, effort = motor torque converted to the joint, N m",
+        is_viewed=True,
     ),
-    _joints("gravity_effort", "outer", "effort = torque that carries the links, N m"),
+    _joints("gravity_effort", "outer", "effort = torque that balances gravity, N m"),
     _joints(
         "joint_velocity_command",
         "outer",
@@ -233,7 +236,7 @@ TOPICS: Final = (
     _joints(
         "joint_posture_command",
         "outer",
-        "joint angles, rad; the arm holds them, but not along a commanded force; for a moving "
+        "joint angles, rad; the arm holds them in all directions except that of a commanded force; for a moving "
         "posture also its velocity, rad/s",
     ),
     Topic(
@@ -246,14 +249,14 @@ TOPICS: Final = (
     _joints(
         "joint_torque_command",
         "outer",
-        "joint torques commanded by your program, N m; they take the place of force and posture",
+        "joint torques that your program commands, N m, in place of force and posture",
     ),
     Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero ends it"),
     Topic(
         "task_command",
         TABLE,
         "outer",
-        "forces, velocities, positions and impedances along chosen axes, one row each; without a row there is no task; "
+        "forces, velocities, positions and impedances along chosen axes, one row each; no row: no task; "
         "float64 columns: see docs/tasks.md",
         columns=TASK_COLUMNS,
     ),
@@ -269,10 +272,10 @@ TOPICS: Final = (
         "force_measured",
         WRENCH,
         "outer",
-        "force of the arm on the world along the commanded direction, measured, N",
+        "measured force of the arm on the world, along the commanded direction, N",
         is_viewed=True,
     ),
-    Topic("force_error", WRENCH, "outer", "F_error, commanded less measured force, before saturation, N"),
+    Topic("force_error", WRENCH, "outer", "F_error, commanded minus measured force, before saturation, N"),
     Topic("force_error_limited", WRENCH, "outer", "F_error after saturation, N"),
     Topic(
         "force_axis",
