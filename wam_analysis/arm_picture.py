@@ -3,13 +3,13 @@
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Polygon
 
 from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL_COLOUR, TUBE_COLOURS
 from wam_analysis.thresholds import LAYOUT
@@ -21,34 +21,19 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, ObjectState
 from wam_description.world import World
 
-OUTLINE = "#3b4148"
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
-
-
-class Tube(NamedTuple):
-    """A cover: a cylinder with rounded ends between two points of the base frame, m."""
-
-    start: Numbers
-    end: Numbers
-    radius: float
-    colour: str
+PLANES, SOLIDS, PEDESTAL, ARM = range(4)  # layers: what is drawn over what
+ANGLES = np.linspace(0.0, 2.0 * math.pi, 20, endpoint=False)
+CIRCLE, SQUARE = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]), np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+CAP = np.linspace(0.08, 0.5, 4) * math.pi  # elevations of the rings on a rounded end
 
 
 class Face(NamedTuple):
-    """A flat face: corners (k, 3) in m and outward normal (3,), base frame, the shape that has it, and its colour."""
+    """A flat face: corners (k, 3) in m, base frame, counter-clockwise from outside; its colour and layer."""
 
     corners: Numbers
-    normal: Numbers
-    shape: str
     colour: str
-
-
-class SideScene(NamedTuple):
-    """What is drawn: covers and balls as tubes, everything else as faces; height of the floor, m."""
-
-    tubes: list[Tube]
-    faces: list[Face]
-    floor: float
+    layer: int
 
 
 class View(NamedTuple):
@@ -81,15 +66,6 @@ class View(NamedTuple):
         return (points - self.centre) @ self.axes[:2].T
 
 
-def tubes(arm: Arm, q: Sequence[float]) -> list[Tube]:
-    """The covers of the arm in a pose, q in rad."""
-    body, colours = RigidBody(arm), itertools.cycle(TUBE_COLOURS)
-    return [
-        Tube(body.point(q, one.name, one.start), body.point(q, one.name, one.end), one.radius, colour)
-        for one, colour in zip(rows(arm.covers), colours, strict=False)
-    ]
-
-
 def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[Numbers, Numbers]:
     """Point of a contact on the surface of its cover, and its force, base frame, m and N.
 
@@ -110,47 +86,60 @@ def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[
     return body.point(q, contact.cover, point), body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)
 
 
-def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectState] = ()) -> SideScene:
+def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectState] = ()) -> list[Face]:
     """The arm in a pose, q in rad, and its world; without the states of its objects the obstacles alone."""
-    balls: list[Tube] = []
     faces: list[Face] = []
     for fixed in rows(world.obstacles):
         if not (states and fixed.name in world.moving):
-            rotation, centre = rotation_xyz(*fixed.rotation), np.array(fixed.position)
-            faces += _faces(fixed.shape, np.array(fixed.size), rotation, centre, BLOCK_COLOUR)
+            solid = _solid(fixed.shape, fixed.size, rotation_xyz(*fixed.rotation), np.array(fixed.position))
+            faces += [Face(corners, BLOCK_COLOUR, SOLIDS if fixed.shape != "plane" else PLANES) for corners in solid]
     floor = min([float(face.corners[:, 2].min()) for face in faces], default=-0.2)  # at the lowest obstacle
     for one, state in zip(world.solids, states, strict=False):
         rotation = pin.Quaternion(state.qw, state.qx, state.qy, state.qz).matrix()
-        centre = np.array((state.x, state.y, state.z)) + rotation @ one.centre
+        solid = _solid(one.shape, one.size, rotation, np.array((state.x, state.y, state.z)) + rotation @ one.centre)
         colour = BLOCK_COLOUR if one.name in world.moving else OBJECT_COLOUR
-        if one.shape == "ball":
-            balls.append(Tube(centre, centre, one.size[0], colour))
-        else:
-            faces += _faces(one.shape, np.array(one.size), rotation, centre, colour)
-    return SideScene([*tubes(arm, q), *balls], faces, floor)
+        faces += [Face(corners, colour, SOLIDS) for corners in solid]
+    pillar = _tube(np.array([0.0, 0.0, floor + LAYOUT.pedestal]), np.zeros(3), LAYOUT.pedestal)
+    faces += [Face(corners, PEDESTAL_COLOUR, PEDESTAL) for corners in pillar]
+    body = RigidBody(arm)
+    for one, colour in zip(rows(arm.covers), itertools.cycle(TUBE_COLOURS), strict=False):
+        start, end = (body.point(q, one.name, point) for point in (one.start, one.end))
+        faces += [Face(corners, colour, ARM) for corners in _tube(start, end, one.radius)]
+    return faces
 
 
-def _faces(shape: str, size: Numbers, rotation: Numbers, centre: Numbers, colour: str) -> Iterator[Face]:
-    """The faces of a solid; round ones in facets."""
-    for corners, normal in _corners(shape, size):
-        yield Face(corners @ rotation.T + centre, rotation @ normal, shape, colour)
+def _solid(shape: str, size: Sequence[float], rotation: Numbers, centre: Numbers) -> Iterator[Numbers]:
+    """Faces of a plane, or of a prism over a square or a circle, or of a ball, all with their centre."""
+    if shape == "ball":
+        yield from _tube(centre, centre, size[0])
+        return
+    ring = size[0] * CIRCLE if shape == "cylinder" else SQUARE * size[:2]
+    half = size[1] if shape == "cylinder" else 0.0 if shape == "plane" else size[2]
+    for corners in _between([(1.0, -half), (1.0, half)][shape == "plane" :], ring):
+        yield corners @ rotation.T + centre
 
 
-def _corners(shape: str, size: Numbers) -> Iterator[tuple[Numbers, Numbers]]:
-    """Corners and outward normal of each face: a plane, or a prism over a square or a circle."""
-    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * size[:2]
-    angles = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
-    round_ring = size[0] * np.column_stack([np.cos(angles), np.sin(angles)])
-    ring, half = (round_ring, size[1]) if shape == "cylinder" else (square, 0.0 if shape == "plane" else size[2])
-    for sign in (1.0,) if shape == "plane" else (-1.0, 1.0):
-        yield np.column_stack([ring, np.full(len(ring), sign * half)]), np.array([0.0, 0.0, sign])
-    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True) if half else ():
-        along = (b - a) / np.linalg.norm(b - a)
-        yield np.array([[*a, -half], [*b, -half], [*b, half], [*a, half]]), np.array([along[1], -along[0], 0.0])
+def _tube(start: Numbers, end: Numbers, radius: float) -> Iterator[Numbers]:
+    """Faces of a cylinder with rounded ends between two points."""
+    length = float(np.linalg.norm(end - start))
+    caps = [(float(np.cos(at)), float(radius * np.sin(at)) + length) for at in CAP]
+    profile = [*((scale, length - height) for scale, height in caps[::-1]), *caps]
+    along = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end - start if length else pin.ZAxis).matrix()
+    for corners in _between(profile, radius * CIRCLE):
+        yield corners @ along.T + start
+
+
+def _between(profile: Sequence[tuple[float, float]], ring: Numbers) -> Iterator[Numbers]:
+    """Faces of a solid whose sections are a ring, (n, 2), with a scale at each height."""
+    rings = [np.column_stack([scale * ring, np.full(len(ring), height)]) for scale, height in profile]
+    yield rings[-1]
+    yield rings[0][::-1]
+    for low, high in itertools.pairwise(rings):
+        yield from np.stack([low, np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high], axis=1)
 
 
 def side_view(
-    shown: SideScene,
+    shown: Sequence[Face],
     aspect: float,
     margin: float = 0.08,
     azimuth: float = 112.0,
@@ -158,11 +147,9 @@ def side_view(
     more: Sequence[Numbers] = (),
 ) -> View:
     """A view from the side and a little from above that shows a scene and points; aspect: width by height."""
-    points = [point for tube in shown.tubes for point in (tube.start, tube.end)]
-    points += [corner for face in shown.faces for corner in face.corners if face.shape != "plane"]
-    points += [np.array([0.0, 0.0, shown.floor]), *more]
+    points = np.vstack([*(face.corners for face in shown if face.layer != PLANES), *more])
     view = View(azimuth=azimuth, elevation=elevation, centre=np.zeros(3), width=1.0, height=1.0)
-    projected = view.project(np.array(points))
+    projected = view.project(points)
     low, high = projected.min(axis=0), projected.max(axis=0)
     centre = ((low + high) / 2.0) @ view.axes[:2]
     width, height = high - low + 2.0 * margin
@@ -170,27 +157,18 @@ def side_view(
     return view._replace(centre=centre, width=float(width), height=float(width / aspect))
 
 
-def draw(axes: Axes, shown: SideScene, view: View) -> None:
-    """A scene: faces shaded, the farthest first, then the tubes with their true radii."""
+def draw(axes: Axes, shown: Sequence[Face], view: View) -> None:
+    """A scene: the faces that are seen, shaded, by layer and the farthest first."""
     axes.set_axis_off()
     axes.set(xlim=(-view.width / 2.0, view.width / 2.0), ylim=(-view.height / 2.0, view.height / 2.0), aspect="equal")
-    for tube in shown.tubes:
-        shadow = [np.array([*end[:2], shown.floor]) for end in (tube.start, tube.end)]
-        _stadium(axes, view.project(np.array(shadow)), tube.radius, facecolor="#e9ebee", edgecolor="none", zorder=1)
-    forward = view.axes[2]
-    for face in sorted(shown.faces, key=lambda face: -float(np.mean(face.corners @ forward))):
-        if face.normal @ forward < 0.0:
-            shade = 0.78 + 0.22 * max(float(face.normal @ LIGHT), 0.0)
-            colour = tuple(shade * channel for channel in to_rgb(face.colour))
-            corners = view.project(face.corners)
-            edge = colour if face.shape == "cylinder" and len(corners) == 4 else "#8a6f3a"
-            zorder = 2 if face.shape == "plane" else 3
-            axes.add_patch(Polygon(corners, facecolor=colour, edgecolor=edge, linewidth=0.6, zorder=zorder))
-    pillar = np.array([0.0, 0.0, shown.floor + LAYOUT.pedestal])
-    _draw_tube(axes, view, Tube(pillar, np.zeros(3), LAYOUT.pedestal, PEDESTAL_COLOUR), 4.0)
-    order = sorted(shown.tubes, key=lambda tube: -float((tube.start + tube.end) @ forward))
-    for depth, tube in enumerate(order):
-        _draw_tube(axes, view, tube, 4.1 + 0.1 * depth)
+    forward, corners, colours = view.axes[2], [], []
+    for face in sorted(shown, key=lambda face: (face.layer, -float(np.mean(face.corners @ forward)))):
+        normal = np.cross(face.corners[2] - face.corners[0], face.corners[3] - face.corners[1])
+        if normal @ forward < 0.0:
+            light = max(float(normal @ LIGHT / np.linalg.norm(normal)), 0.0)
+            corners.append(view.project(face.corners))
+            colours.append((0.7 + 0.3 * light) * np.array(to_rgb(face.colour)))
+    axes.add_collection(PolyCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.4))
 
 
 def arrow(axes: Axes, tail: Numbers, tip: Numbers, colour: str, width: float) -> None:
@@ -199,27 +177,3 @@ def arrow(axes: Axes, tail: Numbers, tip: Numbers, colour: str, width: float) ->
     axes.annotate(
         "", (tip[0], tip[1]), (tail[0], tail[1]), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=30.0 - width
     )
-
-
-def _draw_tube(axes: Axes, view: View, tube: Tube, zorder: float) -> None:
-    """A tube with the shading of a cylinder: nested stadiums, brighter towards the light."""
-    ends = view.project(np.array([tube.start, tube.end]))
-    light = view.axes[:2] @ LIGHT
-    colour = np.array(to_rgb(tube.colour))
-    rim = {"facecolor": colour * 0.82, "edgecolor": OUTLINE, "linewidth": 0.9}
-    _stadium(axes, ends, tube.radius, zorder=zorder, **rim)
-    for part in np.linspace(0.05, 0.9, 18):
-        bright = colour * (0.82 + 0.18 * part) + (1.0 - colour) * 0.35 * part**2
-        at = ends + 0.55 * part * tube.radius * light
-        _stadium(axes, at, tube.radius * (1.0 - part), facecolor=bright, edgecolor="none", zorder=zorder)
-
-
-def _stadium(axes: Axes, ends: Numbers, radius: float, **style: Any) -> None:
-    begin, end = ends
-    angle = math.atan2(end[1] - begin[1], end[0] - begin[0])
-    half = np.linspace(-math.pi / 2.0, math.pi / 2.0, 25)
-    caps = [
-        point + radius * np.column_stack([np.cos(angle + half + turn), np.sin(angle + half + turn)])
-        for point, turn in ((end, 0.0), (begin, math.pi))
-    ]
-    axes.add_patch(Polygon(np.vstack(caps), **style))
