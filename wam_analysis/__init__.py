@@ -8,10 +8,9 @@ foreign             recordings of other robots: any bag with joints, wrenches or
 identification      from a recording of free motion to the controllers' model, behind `wam identify`
 traces              forces and contacts of a run on one time base
 held_messages       for how long a recorded message is held, and the gaps of a topic
-holds               the constant forces that were commanded in a run, with names
+holds               the constant forces that were commanded in a run, by themselves or in tasks
 contact_list        the contacts one by one, each estimated one compared with the true one
 unplanned_contact   contacts while no force is commanded that are harder than allowed
-task_forces         constant forces that were commanded, those of tasks, and what was measured of each
 drawing             colours and sizes that all pictures share
 arm_picture         the arm and its obstacles from the side
 table               tables of text, for a terminal and for Markdown

@@ -1,63 +1,138 @@
-"""The constant forces that were commanded in a run, each within one step of the scenario."""
+"""Constant forces that were commanded in a run, by themselves or in a task, each within one step of the scenario."""
 
-import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.held_messages import intervals
-from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import HOLD
-from wam_analysis.traces import Traces
+from wam_bag.arrays import Numbers, Times
 from wam_control.force.contact_place import pinned_position
-from wam_description.signals import ForceCommand
-from wam_sim.reactions import RecordedReaction, of_force_loop, within
+from wam_control.force.task import AxisKind, TaskCommand, task_of
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError
+from wam_description.signals import ForceCommand, Table
+from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.recorded_run import RecordedRun, RecordedStep
+from wam_sim.replay import tables
+
+RecordedTask = tuple[TaskCommand, int, int]  # with begin and end, ns
+
+
+class Hold(NamedTuple):
+    """A constant commanded force.
+
+    Attributes
+    ----------
+    begin, end : ns.
+    frame : of the force, 'base' or a cover.
+    force : (3,), N, of the arm on the world, in that frame.
+    cover : on which a task commands it, '' where none does.
+    position : where the command pins it, m along its cover; NaN where it does not.
+    axis : of a task with several forces, from 0; -1 where it is the only force.
+    name : of the scenario's step, or the force.
+    reactions : what the force loop did meanwhile instead of what was commanded.
+    """
+
+    begin: int
+    end: int
+    frame: str
+    force: Numbers
+    cover: str = ""
+    position: float = math.nan
+    axis: int = -1
+    name: str = ""
+    reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def commanded(self) -> float:
+        """Magnitude of the force, N."""
+        return float(np.linalg.norm(self.force))
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the force was commanded too briefly for a steady state."""
+        return self.end - self.begin < STEADY * 1e9
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the force was not controlled in the end: there is nothing to measure of it."""
+        return any(one.holds and one.end >= self.end - BRIEF for one in self.reactions)
+
+
+def tasks_of(run: RecordedRun, arm: Arm | None) -> list[RecordedTask]:
+    """Each task of a run; none if the arm is not known."""
+    columns = run.table("task_command")
+    if columns is None or arm is None:
+        return []
+    every = list(tables(columns))
+    changes = np.array([one != before for before, one in pairwise(map(str, every))], np.bool_)
+    found = ((_task(every[row], arm), begin, end) for row, begin, end in intervals(columns.stamp_ns, changes))
+    return [(task, begin, end) for task, begin, end in found if task is not None]
+
+
+def _task(table: Table, arm: Arm) -> TaskCommand | None:
+    try:
+        return task_of(table, arm)
+    except ParameterError:  # refused when it was commanded, too
+        return None
+
+
+def task_forces(tasks: Iterable[RecordedTask]) -> Iterator[Hold]:
+    """The forces at points of links in some tasks, in the order of time."""
+    for task, begin, end in tasks:
+        forces = [
+            (i, axis) for i, axis in enumerate(task.axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value
+        ]
+        for i, axis in forces:
+            position = math.nan if axis.position is None else axis.position
+            number = i if len(forces) > 1 else -1
+            yield Hold(begin, end, task.frame, np.array(axis.direction) * axis.value, axis.cover, position, number)
+
+
+def measured_force(run: RecordedRun, number: int, begin: int, end: int) -> tuple[Times, Numbers]:
+    """Stamps, ns, and the force that was measured along an axis of a task, N, between two times."""
+    columns = run.table("task_axes")
+    if columns is None or "measured" not in columns.columns:
+        return np.empty(0, np.int64), np.empty(0)
+    place = np.arange(len(columns.message)) - np.searchsorted(columns.message, columns.message)  # within its message
+    stamps = columns.row_stamp_ns
+    rows = (place == number) & (stamps >= begin) & (stamps < end)
+    return stamps[rows], np.asarray(columns.columns["measured"][rows], float)
 
 
 def holds_of(
-    run: RecordedRun,
-    steps: Sequence[RecordedStep],
-    tasks: Sequence[Hold],
-    traces: Traces,
-    reactions: Sequence[RecordedReaction],
+    run: RecordedRun, steps: Sequence[RecordedStep], tasks: Sequence[Hold], reactions: Sequence[RecordedReaction]
 ) -> tuple[Hold, ...]:
     """Intervals with one commanded force, in the order of time."""
-    holds: list[Hold] = []
-    found = (*_forces(run, steps), *_forces_of_tasks(steps, tasks))
-    long = [one for one in found if one.commanded > HOLD.equal_force and one.end - one.begin >= HOLD.shortest * 1e9]
+    starts, holds = [step.begin for step in steps], dict[str, Hold]()
+    parts = [
+        one._replace(begin=begin, end=end)
+        for one in (*_commanded(run), *tasks)
+        for begin, end in pairwise([one.begin, *(at for at in starts if one.begin < at < one.end), one.end])
+    ]
+    long = [one for one in parts if one.commanded > HOLD.equal_force and one.end - one.begin >= HOLD.shortest * 1e9]
     for hold in sorted(long, key=lambda one: (one.begin, one.axis)):
         name = next((step.name for step in steps if step.begin <= (hold.begin + hold.end) // 2 < step.end), "")
-        taken = [hold.name for hold in holds]
         name = (name or f"{hold.commanded:.3g} N") + f", axis {hold.axis + 1}" * (hold.axis >= 0)
-        name = name if name not in taken else f"{name} ({hold.begin / 1e9:.1f} s)"
-        pushed = traces.during(hold.begin, hold.end) & traces.push.acts
+        name = name if name not in holds else f"{name} ({hold.begin / 1e9:.1f} s)"
         own = within(of_force_loop(reactions), hold.begin, hold.end)
-        holds.append(hold._replace(name=name, disturbed=bool(np.any(pushed)), reactions=own))
-    return tuple(holds)
+        holds[name] = hold._replace(name=name, reactions=own)
+    return tuple(holds.values())
 
 
-def _forces(run: RecordedRun, steps: Sequence[RecordedStep]) -> Iterator[Hold]:
+def _commanded(run: RecordedRun) -> Iterator[Hold]:
     """Those of force_command, without names."""
     commands = run.wrench("force_command")
     if commands is None:
         return
     frames = np.array(commands.frames)
     changed = np.any(np.abs(np.diff(commands.force, axis=0)) > HOLD.equal_force, axis=1) | (frames[1:] != frames[:-1])
-    starts = np.searchsorted(commands.stamp_ns, [step.begin for step in steps]) - 1
-    changed[starts[(starts >= 0) & (starts < len(changed))]] = True
     for row, begin, end in intervals(commands.stamp_ns, changed):
         force, torque = (each[row] for each in (commands.force, commands.torque))
         command = ForceCommand(str(frames[row]), tuple(force.tolist()), tuple(torque.tolist()))
         _, position = pinned_position(command) or ("", math.nan)
         yield Hold(begin, end, command.frame, force, position=position)
-
-
-def _forces_of_tasks(steps: Sequence[RecordedStep], tasks: Sequence[Hold]) -> Iterator[Hold]:
-    """Those of tasks, without names."""
-    starts = [step.begin for step in steps]
-    for task in tasks:
-        bounds = [task.begin, *(at for at in starts if task.begin < at < task.end), task.end]
-        for begin, end in itertools.pairwise(bounds):
-            yield task._replace(begin=begin, end=end)

@@ -9,9 +9,8 @@ from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theo
 from wam_analysis.findings.transmission import TransmissionFriction, transmission_friction
 from wam_analysis.foreign.sources import Source, alternates, command_of, sources
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
-from wam_analysis.holds import holds_of
+from wam_analysis.holds import Hold, RecordedTask, holds_of, task_forces, tasks_of
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
-from wam_analysis.task_forces import Hold, RecordedTask, task_forces, tasks_of
 from wam_analysis.traces import Traces, traces_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.arrays import Mask
@@ -170,7 +169,7 @@ class AnalysedRecording:
     @property
     def task_forces(self) -> list[Hold]:
         """The forces at points of links in all tasks, in the order of time."""
-        return task_forces(self.tasks)
+        return list(task_forces(self.tasks))
 
     @cached_property
     def traces(self) -> Traces:
@@ -186,7 +185,7 @@ class AnalysedRecording:
     @cached_property
     def holds(self) -> tuple[Hold, ...]:
         """The constant forces that were commanded."""
-        return holds_of(self.run, self.steps, self.task_forces, self.traces, self.reactions)
+        return holds_of(self.run, self.steps, self.task_forces, self.reactions)
 
     @cached_property
     def held(self) -> tuple[HeldForce, ...]:

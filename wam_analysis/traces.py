@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.held_messages import held_rows, joint_angles, with_holes
-from wam_analysis.task_forces import Hold
+from wam_analysis.holds import Hold
 from wam_analysis.thresholds import TOUCH
 from wam_bag.arrays import Mask, Names, Numbers, Times
 from wam_description.arm import Arm

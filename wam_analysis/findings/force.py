@@ -7,9 +7,8 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.guarded import sentence as guard_sentence
-from wam_analysis.findings.held_force import HeldForce, Theory
+from wam_analysis.findings.held_force import ForceAccuracy, HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
-from wam_analysis.measures.force_accuracy import ForceAccuracy
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
@@ -130,7 +129,7 @@ def _press_sentence(one: HeldForce) -> str:
     if response is not None and math.isfinite(response.rise):
         remarks += [f"{why}, so rise time and overshoot are not evaluated" for why in [_impact(one)] if why]
         remarks += ["it did not settle to 5 %"] * math.isinf(response.settling)
-    return "; ".join([*remarks, *["the arm was pushed meanwhile"] * hold.disturbed]) + "."
+    return "; ".join([*remarks, *["the arm was pushed meanwhile"] * one.is_pushed]) + "."
 
 
 def _impact(one: HeldForce) -> str:

@@ -9,16 +9,15 @@ import numpy as np
 from wam_analysis.contact_list import most
 from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
-from wam_analysis.findings.swinging import Swinging, at_the_contact, swinging
+from wam_analysis.findings.swinging import Swinging, swinging
 from wam_analysis.held_messages import joint_angles, row_at
-from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.recorded import PredictionParameters
-from wam_analysis.task_forces import Hold, measured_force
+from wam_analysis.holds import Hold, measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
-from wam_analysis.traces import ForceSignal, Traces
+from wam_analysis.traces import Traces
 from wam_bag.arrays import Mask, Numbers
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
@@ -26,7 +25,26 @@ from wam_description.transmission_map import TransmissionMap
 from wam_sim.recorded_run import RecordedRun
 from wam_theory.verdicts import Verdict
 
-UNMEASURED = dict.fromkeys(("true", "measured", "estimated"), force_accuracy(math.nan, np.empty(0)))
+
+class ForceAccuracy(NamedTuple):
+    """Deviation of a held force from the one commanded, N; NaN if it was not measured.
+
+    Attributes
+    ----------
+    bias : mean deviation.
+    ripple : half of the range of the force, from its 0.5th to its 99.5th percentile.
+    """
+
+    bias: float = math.nan
+    ripple: float = math.nan
+
+    @property
+    def smallest(self) -> float:
+        """Smallest controllable force: |bias| + ripple."""
+        return abs(self.bias) + self.ripple
+
+
+UNMEASURED = dict.fromkeys(("true", "measured", "estimated"), ForceAccuracy())
 
 
 class HeldForce(NamedTuple):
@@ -45,6 +63,7 @@ class HeldForce(NamedTuple):
     cycle : apart from the dither, of the true force in its last 70 %, else of the measured one.
     cover, position : of the contact, by the simulator, else estimated, else as configured in the force loop; m.
     swinging : of the force, of a motor or joint where neither the measured nor the true one was recorded; None without.
+    is_pushed : whether the scenario pushed the arm meanwhile.
     """
 
     hold: Hold
@@ -60,20 +79,23 @@ class HeldForce(NamedTuple):
     cover: str = ""
     position: float = math.nan
     swinging: Swinging | None = None
+    is_pushed: bool = False
 
 
 def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
     """Evaluate a hold; of a force that was not controlled its signals are all there is."""
     time, measured = _measured(run, hold)
-    rows = traces.during(hold.begin, hold.end) & traces.commanded.acts & (hold.axis < 0)
+    during = traces.during(hold.begin, hold.end)
+    rows = during & traces.commanded.acts & (hold.axis < 0)
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
     true, estimated = (traces.along(signal, -1.0)[rows] for signal in (traces.true, traces.estimated))
     duration = (hold.end - hold.begin) / 1e9
     signals = {"true": (time_true, true), "measured": (time, measured), "estimated": (time_true, estimated)}
     if not np.any(np.isfinite(true)):
         time_true, true = np.empty(0), np.empty(0)
-    cover, position = _touched(traces, parameters, hold)
-    held = HeldForce(hold, time, measured, time_true, true, cover=cover, position=position)
+    cover, position = _touched(traces, parameters, during)
+    pushed = bool(np.any(during & traces.push.acts))
+    held = HeldForce(hold, time, measured, time_true, true, cover=cover, position=position, is_pushed=pushed)
     if hold.is_refused:
         return held
     touched = _touch_down(traces, parameters, hold)
@@ -81,7 +103,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     steady, late = ((1.0 - part) * duration for part in (HOLD.steady, CYCLE.late_part))
-    accuracy = {name: force_accuracy(hold.commanded, force[at >= steady]) for name, (at, force) in signals.items()}
+    accuracy = {name: _accuracy(force[at >= steady] - hold.commanded) for name, (at, force) in signals.items()}
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
     cycles = (_cycle(at[at >= late], force[at >= late], dither) for at, force in ((time_true, true), (time, measured)))
@@ -91,7 +113,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
         before=_before(traces, hold, measured),
         accuracy=UNMEASURED if hold.is_short else accuracy,  # a short one has no steady part
         cycle=next(filter(None, cycles), NO_CYCLE),
-        swinging=swinging(run, hold, time, measured) if len(measured) else swinging(run, hold, time_true, true),
+        swinging=swinging(run, hold, *((time, measured) if len(measured) else (time_true, true))),
     )
 
 
@@ -106,6 +128,14 @@ def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:
     along: Numbers = columns.force[a:b] @ (hold.force / hold.commanded)
     good = np.isfinite(along)
     return (columns.stamp_ns[a:b][good] - hold.begin) / 1e9, along[good]
+
+
+def _accuracy(error: Numbers) -> ForceAccuracy:
+    """Of a force by its deviations, (n,), N, in the steady state; NaN where it is not known."""
+    if not len(error := error[np.isfinite(error)]):
+        return ForceAccuracy()
+    low, high = np.percentile(error, [0.5, 99.5]).tolist()
+    return ForceAccuracy(float(np.mean(error)), (high - low) / 2.0)
 
 
 def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> StepResponse | None:
@@ -162,24 +192,16 @@ def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
     return limit_cycle(time, value)
 
 
-def _touched(traces: Traces, parameters: PredictionParameters, hold: Hold) -> tuple[str, float]:
+def _touched(traces: Traces, parameters: PredictionParameters, during: Mask) -> tuple[str, float]:
     """Cover and position of the contact, by the simulator, else estimated, else as configured in the force loop."""
-    loop = parameters.force_loop
-    rows = traces.during(hold.begin, hold.end)
     for signal in (traces.true, traces.estimated):
-        found = _median_position(signal, rows & signal.acts)
-        if found[0]:
-            return found
+        if np.any(rows := during & signal.acts):
+            cover = most(signal.frame[rows])
+            positions = signal.position[rows & (signal.frame == cover)]
+            if np.any(known := np.isfinite(positions)):
+                return cover, float(np.median(positions[known]))
+    loop = parameters.force_loop
     return (loop.contact_cover, loop.contact_position) if loop is not None else ("", math.nan)
-
-
-def _median_position(signal: ForceSignal, rows: Mask) -> tuple[str, float]:
-    if not np.any(rows):
-        return "", math.nan
-    cover = most(signal.frame[rows])
-    positions = signal.position[rows & (signal.frame == cover)]
-    positions = positions[np.isfinite(positions)]
-    return (cover, float(np.median(positions))) if len(positions) else ("", math.nan)
 
 
 class Theory(NamedTuple):
@@ -223,7 +245,9 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
     found = guarded(parameters, q, cover, position, direction, node.contact_stiffness)
     moved, seen = math.nan, one.swinging
     if seen is not None and seen.swings.verdict is Verdict.LIMIT_CYCLE:
-        moved = at_the_contact(seen, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
+        turned = TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre
+        ratio = abs(dict(zip(arm.motors.names, turned.tolist(), strict=True)).get(seen.shaft, 0.0))
+        moved = seen.swings.peak_to_peak / ratio if ratio else math.nan
     return Theory(node, predicted, largest, found, moved)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from wam_analysis.findings.finding import Finding
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
-from wam_analysis.task_forces import Hold
+from wam_analysis.holds import Hold
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns
@@ -73,11 +73,3 @@ def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
         value,
         max(CYCLE.least_swing * extent, CYCLE.loud_swing * noise(value)),
     )
-
-
-def at_the_contact(found: Swinging, motors: tuple[str, ...], motor_per_metre: Numbers) -> float:
-    """Swing of a motor as a motion of the contact along the force, m; NaN for a joint."""
-    if found.shaft not in motors:
-        return math.nan
-    ratio = abs(float(motor_per_metre[motors.index(found.shaft)]))
-    return found.swings.peak_to_peak / ratio if ratio > 0.0 else math.nan

@@ -1,7 +1,6 @@
 """Measures of recorded signals: pure functions of arrays, without bags and ROS.
 
 response            rise, settling and overshoot of a step
-force_accuracy      accuracy of a held force
 limit_cycle         amplitude, period and confidence of a limit cycle
 episodes            limit cycles that fill a part of a recording
 lines               lines in the spectrum, above the noise
