@@ -21,7 +21,6 @@ from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.prediction import largest_force, node_at
-from wam_analysis.findings.tabulated import tabulated
 from wam_analysis.findings.text import SCHEMA, json_text, text
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
@@ -499,7 +498,7 @@ def test_no_sample_has_a_number_that_cannot_be_or_that_was_not_measured(samples:
         lacks_force = "/wam/force_measured" not in analysis.recording.bag.topics
         numbers = [one for section in analysis.sections for one in section.findings]
         assert not (lacks_force and any("limit cycle" in o.name and math.isfinite(o.measured) for o in numbers)), name
-        for one in numbers:  # an ideal is no prediction
+        for one in numbers:  # nothing right by definition is a prediction
             assert not (one.predicted in (0.0, 100.0) and one.unit in ("%", "cm", "N")), (name, one)
 
 
@@ -516,8 +515,6 @@ def test_a_number_far_from_its_prediction_is_flagged(samples: dict[str, Analysis
     assert "a 1 +- 0.05 N, predicted 1.2" in deviations((Finding("a", "N", 1.0, 1.2, "", 0.05),))[0]
     assert Finding("a", "N", 1.0, 1.2, "", 0.05).deviates
     assert not Finding("a", "N", 1.0, 1.1, "", 0.05).deviates
-    ideal = Finding("a", "s", 1.0, 0.1, "", 0.05, is_ideal=True)
-    assert (ideal.deviates, tabulated([ideal])[0][1][1]) == (False, "1 +- 0.05 | 0.1 *")
     assert not Finding("a", "N", math.nan, 1.1, "", 0.05).deviates
 
 

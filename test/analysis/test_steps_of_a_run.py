@@ -22,7 +22,6 @@ from wam_analysis.findings.analysis import SECTIONS_OF_STEPS, TOPICS_READ, Analy
 from wam_analysis.findings.contact import BLIND
 from wam_analysis.findings.finding import Section
 from wam_analysis.findings.force import press_findings
-from wam_analysis.findings.held_force import Theory
 from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.recorded import RecordedArm, prediction_parameters, recorded_arm
@@ -140,7 +139,7 @@ def section_of(bag: Bag, key: str) -> Section:
 
 def forces_of(recording: Played) -> dict[str, float]:
     """The numbers of all commanded forces."""
-    return {one.name: one.measured for held in recording.summary().held for one in press_findings(held, Theory())}
+    return {one.name: one.measured for held in recording.summary().held for one in press_findings(held)}
 
 
 def hypotheses(series: list[Any]) -> TableColumns:

@@ -19,7 +19,6 @@ class Finding(NamedTuple):
     note : qualification of either, '' if there is none.
     error : standard error of `measured`; NaN if it is not known.
     is_lower_bound : whether `measured` is the least value that is possible, and no estimate.
-    is_ideal : whether `predicted` leaves out what the stack does on purpose, so that a difference is no deviation.
     """
 
     name: str
@@ -29,7 +28,6 @@ class Finding(NamedTuple):
     note: str = ""
     error: float = math.nan
     is_lower_bound: bool = False
-    is_ideal: bool = False
 
     @property
     def subject(self) -> str:
@@ -49,8 +47,6 @@ class Finding(NamedTuple):
     @property
     def deviates(self) -> bool:
         """Whether it differs from its prediction by more than three standard errors."""
-        if self.is_ideal:
-            return False
         error = math.hypot(self.error, SHAFT.neglected * self.predicted)
         return bool(abs(self.measured - self.predicted) > SHAFT.sigmas * error)  # not with NaN
 

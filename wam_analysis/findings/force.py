@@ -32,7 +32,7 @@ def force_section(recording: AnalysedRecording) -> Section:
     for one in held:
         sentences.append(_press_sentence(one))
         sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions, zero)]
-        findings += press_findings(one, recording.theories[one.hold.name])
+        findings += press_findings(one)
     if not held:
         sentences.append(f"{NO_FORCE}.")
     other = _other_reactions(recording)
@@ -143,7 +143,7 @@ def _impact(one: HeldForce) -> str:
     return f"the surface was touched {when}, and the force peaked at {shown(peak, 'N')}"
 
 
-def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
+def press_findings(one: HeldForce) -> list[Finding]:
     """A commanded force in numbers: how it was held, and how it was reached."""
     name, response = one.hold.name, one.response
     seconds = sum(reaction.end - reaction.begin for reaction in one.hold.reactions if reaction.holds) / 1e9
@@ -158,18 +158,13 @@ def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
             Finding(f"{name}: error of the {whose} force", "%", error),
             Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
         ]
-    if theory.predicted is not None:
-        rise = math.log(9.0) * theory.predicted.time_constant
-        note = "predicted by (5.2) for the loop alone: without friction, inertia, feed-forward, limits of the approach"
-    else:
-        rise, note = math.nan, ""
     if response is not None:
         rose, late, over = response.rise, response.rise_error, 100.0 * response.overshoot
         if _impact(one):
             rose = late = over = math.nan
         since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
-            Finding(f"{name}: rise time 10-90 %", "s", rose, rise, note, late, is_ideal=True),
+            Finding(f"{name}: rise time 10-90 %", "s", rose, error=late),
             Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
             Finding(f"{name}: overshoot", "%", over),
         ]

@@ -11,11 +11,11 @@ from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
 from wam_analysis.findings.swinging import Swinging, swinging
 from wam_analysis.held_messages import joint_angles, row_at
+from wam_analysis.holds import Hold, measured_force
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.recorded import PredictionParameters
-from wam_analysis.holds import Hold, measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_analysis.traces import Traces
 from wam_bag.arrays import Mask, Numbers

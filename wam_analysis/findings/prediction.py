@@ -49,13 +49,11 @@ class Predicted(NamedTuple):
 
     Attributes
     ----------
-    time_constant : of the frictionless loop, 1/(G_I K), s, (5.2).
     force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected, with the driven stiffness.
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
     is_certain : whether (5.11) is small enough for (5.8), (5.9).
     """
 
-    time_constant: float
     force_peak_to_peak: float
     period: float
     actuator_peak_to_peak: float
@@ -127,7 +125,7 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
         nan = math.nan
-        return Predicted(nan, nan, nan, nan, False)
+        return Predicted(nan, nan, nan, False)
     fs, fd = node.static_friction, node.dynamic_friction
     zeta = float(linear_loop.damping_ratio(j, b, ktr, kc))
     gamma = float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain))
@@ -137,8 +135,7 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     period = float(stiction.stiction_cycle_period(gain, driven, kc, fs, fd, damped))
     certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
     actuator = float(regimes.actuator_cycle(fd, ktr, gamma, zeta))
-    time_constant = float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc)))
-    return Predicted(time_constant, size, period, actuator, certain)
+    return Predicted(size, period, actuator, certain)
 
 
 class LargestForce(NamedTuple):

@@ -1,14 +1,13 @@
 """Whether the force of a hold settles, cycles or diverges; where it was not recorded, what a motor or joint does."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding
+from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
-from wam_analysis.holds import Hold
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns

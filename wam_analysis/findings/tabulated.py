@@ -9,11 +9,9 @@ from wam_analysis.findings.finding import Finding, shown
 MARK = " !"  # after a number more than three standard errors from its prediction
 BESIDE = " +- "  # before its standard error
 PREDICTED = " | "  # before its prediction
-IDEAL = " *"  # after a prediction that leaves out what the stack does on purpose
 LEGENDS = {
     BESIDE: "+-: one standard deviation",
     PREDICTED: "measured | predicted",
-    IDEAL: "* predicted as if the stack did not slow its motions on purpose",
     MARK: "! more than three standard errors from its prediction",
 }
 
@@ -69,5 +67,5 @@ def _cell(one: Finding) -> str:
     measured = ">=" * one.is_lower_bound + shown(one.measured)
     if np.isfinite(one.error) and np.isfinite(one.measured):
         measured += f"{BESIDE}{shown(one.error)}"
-    predicted = "" if np.isnan(one.predicted) else f"{PREDICTED}{shown(one.predicted)}{IDEAL * one.is_ideal}"
+    predicted = "" if np.isnan(one.predicted) else f"{PREDICTED}{shown(one.predicted)}"
     return measured + MARK * one.deviates + predicted
