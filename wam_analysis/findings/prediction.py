@@ -49,15 +49,14 @@ class Predicted(NamedTuple):
 
     Attributes
     ----------
-    force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected, with the driven stiffness.
+    force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected, with the driven stiffness;
+        NaN where (5.11) is too large for them, or nothing cycles.
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
-    is_certain : whether (5.11) is small enough for (5.8), (5.9).
     """
 
     force_peak_to_peak: float
     period: float
     actuator_peak_to_peak: float
-    is_certain: bool
 
 
 def node_at(
@@ -124,8 +123,7 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     """
     j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
-        nan = math.nan
-        return Predicted(nan, nan, nan, False)
+        return Predicted(math.nan, math.nan, math.nan)
     fs, fd = node.static_friction, node.dynamic_friction
     zeta = float(linear_loop.damping_ratio(j, b, ktr, kc))
     gamma = float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain))
@@ -133,9 +131,10 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     damped = float(linear_loop.damping_ratio(j, b, driven, kc))
     size = float(stiction.stiction_cycle_force(driven, kc, fs, fd, damped))
     period = float(stiction.stiction_cycle_period(gain, driven, kc, fs, fd, damped))
-    certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
+    if float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) > HOLD.certain or math.isinf(period):
+        size = period = math.nan
     actuator = float(regimes.actuator_cycle(fd, ktr, gamma, zeta))
-    return Predicted(size, period, actuator, certain)
+    return Predicted(size, period, actuator)
 
 
 class LargestForce(NamedTuple):
