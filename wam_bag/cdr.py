@@ -195,35 +195,29 @@ class Decoder:
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
-        return self._message(Reading(data, self._is_packed), self._kind)
+        return self._value(Reading(data, self._is_packed), self._kind, None)
 
-    def _message(self, reading: Reading, kind: str) -> Any:
+    def _value(self, reading: Reading, kind: str, length: int | None) -> Any:
+        if length is not None:
+            count = length or reading.count()
+            if kind not in PRIMITIVES:
+                return [self._value(reading, kind, None) for _ in range(count)]
+            start, dtype = reading.numbers(kind, count)
+            return np.frombuffer(reading.data, dtype, count, start)
+        if kind == "string":
+            return reading.text()
+        if kind in PRIMITIVES:
+            start, _ = reading.numbers(kind, 1)
+            (value,) = struct.unpack_from(reading.order + PRIMITIVES[kind], reading.data, start)
+            return value != 0 if kind == "bool" else value
         fields = self._definitions[kind]
-        values = [self._field(reading, inner, length) for _, inner, length in fields]
+        values = [self._value(reading, *field[1:]) for field in fields]
         if not fields and not self._is_packed:
             reading.skip(1)
         if kind not in self._classes:
             names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
             self._classes[kind] = namedtuple(kind.rpartition("/")[2], names)
         return self._classes[kind](*values)
-
-    def _field(self, reading: Reading, kind: str, length: int | None) -> Any:
-        if length is None:
-            return self._one(reading, kind)
-        count = length or reading.count()
-        if kind not in PRIMITIVES:
-            return [self._one(reading, kind) for _ in range(count)]
-        start, dtype = reading.numbers(kind, count)
-        return np.frombuffer(reading.data, dtype, count, start)
-
-    def _one(self, reading: Reading, kind: str) -> Any:
-        if kind == "string":
-            return reading.text()
-        if kind not in PRIMITIVES:
-            return self._message(reading, kind)
-        start, _ = reading.numbers(kind, 1)
-        (value,) = struct.unpack_from(reading.order + PRIMITIVES[kind], reading.data, start)
-        return value != 0 if kind == "bool" else value
 
 
 def from_json(data: bytes) -> Any:
@@ -243,35 +237,28 @@ def encoded(kind: str, value: Sequence[Any]) -> bytes:
     value : its fields in their order: a number, a string, bytes, a sequence of them, or the fields of a message.
     """
     body = bytearray()
-    _add_message(body, kind, value)
+    _add(body, kind, None, value)
     return LITTLE_ENDIAN + bytes(body)
 
 
-def _add_message(body: bytearray, kind: str, value: Sequence[Any]) -> None:
-    for field, part in zip(definition(kind), value, strict=True):
-        if field.length is None:
-            _add_one(body, field.type, part)
-            continue
-        if not field.length:
-            _add_numbers(body, "uint32", [len(part)])
-        if isinstance(part, bytes):
-            body += part
-        elif field.type in PRIMITIVES:
-            _add_numbers(body, field.type, part)
-        else:
-            for item in part:
-                _add_one(body, field.type, item)
-
-
-def _add_one(body: bytearray, kind: str, value: Any) -> None:
-    if kind == "string":
+def _add(body: bytearray, kind: str, length: int | None, value: Any) -> None:
+    """Add a value, an array of so many, or a sequence, of length 0."""
+    if length == 0:
+        _add_numbers(body, "uint32", [len(value)])
+    if isinstance(value, bytes):
+        body += value
+    elif kind in PRIMITIVES:
+        _add_numbers(body, kind, [value] if length is None else value)
+    elif length is not None:
+        for item in value:
+            _add(body, kind, None, item)
+    elif kind == "string":
         text = value.encode() + b"\0"
         _add_numbers(body, "uint32", [len(text)])
         body += text
-    elif kind in PRIMITIVES:
-        _add_numbers(body, kind, [value])
     else:
-        _add_message(body, kind, value)
+        for field, part in zip(definition(kind), value, strict=True):
+            _add(body, field.type, field.length, part)
 
 
 def _add_numbers(body: bytearray, kind: str, values: Sequence[float]) -> None:

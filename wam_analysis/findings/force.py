@@ -238,7 +238,9 @@ def _words(seen: Swings) -> str:
 def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
     name, cycle = one.hold.name, one.cycle
     force, period = (math.nan,) * 2 if predicted is None else (predicted.force_peak_to_peak, predicted.period)
-    note = "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
+    note = (
+        "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
+    )
     seen = cycle.confidence >= CYCLE.sure
     size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3
     return [
