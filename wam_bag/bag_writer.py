@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Final, NamedTuple, Self
 
-from mcap.records import Attachment
+from mcap.records import Attachment, Channel, Schema
 
 from wam_bag import safe_yaml
 from wam_bag.cdr import ExactLength
@@ -236,7 +236,6 @@ class BagWriter:
             path.unlink()
             raise
         self._stream = stream
-        self._schemas = {}
         for topic in self._topics:
             self._define(topic)
 
@@ -247,9 +246,10 @@ class BagWriter:
         """Define a topic in the present file."""
         kind, offered = topic["type"], safe_yaml.dump(topic["offered_qos_profiles"]).strip()
         metadata = {"offered_qos_profiles": offered, "topic_type_hash": topic["type_description_hash"]}
-        if kind not in self._schemas:
-            self._schemas[kind] = self._writer.schema(kind, "ros2msg", schema(kind))
-        self._channels[topic["name"]] = self._writer.channel(topic["name"], "cdr", self._schemas[kind], metadata)
+        number = self._schemas.setdefault(kind, len(self._schemas) + 1)
+        channel = self._channels.setdefault(topic["name"], len(self._channels) + 1)
+        self._writer.define(Schema(number, schema(kind), "ros2msg", kind))
+        self._writer.define(Channel(channel, topic["name"], "cdr", metadata, number))
 
     def _flush(self) -> None:
         self._next_flush = time.monotonic() + FLUSH_PERIOD

@@ -63,18 +63,6 @@ class McapWriter:
         self._index: dict[int, list[int]] = {}
         self._put(MAGIC + serialized(records.Header("ros2", library)))
 
-    def schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Define a schema; returns its id."""
-        schema = records.Schema(self._numbers[Opcode.SCHEMA] + 1, data, encoding, name)
-        self.define(schema)
-        return schema.id
-
-    def channel(self, topic: str, encoding: str, schema: int, metadata: Mapping[str, str]) -> int:
-        """Define a channel; returns its id."""
-        channel = records.Channel(self._numbers[Opcode.CHANNEL] + 1, topic, encoding, dict(metadata), schema)
-        self.define(channel)
-        return channel.id
-
     def define(self, definition: records.Schema | records.Channel) -> None:
         """Take a schema or channel with its id; one that is known already is not written again."""
         if definition in self._defined:

@@ -15,7 +15,7 @@ import pytest
 import yaml
 from bag_comparison import compare
 from mcap.reader import make_reader
-from mcap.records import Message
+from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -201,17 +201,16 @@ def test_after_a_failed_write_the_file_is_still_whole(tmp_path: Path) -> None:
 
     with FullDisk(tmp_path / "bag.mcap", "w") as stream:
         writer = McapWriter(stream, "test", 10**6)
-        bools = writer.channel(
-            "/a", "cdr", writer.schema("std_msgs/msg/Bool", "ros2msg", schema("std_msgs/msg/Bool")), {}
-        )
+        writer.define(Schema(1, schema("std_msgs/msg/Bool"), "ros2msg", "std_msgs/msg/Bool"))
+        writer.define(Channel(1, "/a", "cdr", {}, 1))
         for k in range(3):
-            writer.add(bools, k, k, k, b"\0\1\0\0\1")
+            writer.add(1, k, k, k, b"\0\1\0\0\1")
             stream.room = (10**6, 60, 10**6)[k]
             with contextlib.nullcontext() if k != 1 else pytest.raises(OSError, match="No space"):
                 writer.flush()
             assert (tmp_path / "bag.mcap").stat().st_size == writer.position
         writer.finish()
-    assert writer.counts == {bools: 2}
+    assert writer.counts == {1: 2}
     assert read(tmp_path / "bag.mcap").topics["/a"].log_time_ns.tolist() == [0, 2]
     with (tmp_path / "bag.mcap").open("rb") as stream:
         assert sum(isinstance(record, Message) for record in StreamReader(stream, validate_crcs=True).records) == 2
