@@ -14,7 +14,7 @@ from sample_messages import STORE, joint_state, wrench
 
 from wam_analysis.identification.contradictions import Mistake, contradictions
 from wam_analysis.identification.fit import Identification, identify
-from wam_analysis.identification.motion import evenly, motion, recorded_motion
+from wam_analysis.identification.motion import motion, recorded_motion
 from wam_analysis.identification.overlay import estimator_values, model_values, write_overlay
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.report import report
@@ -95,7 +95,7 @@ class Planted:
         return found
 
     def identify(self) -> Identification:
-        return identify(SHARED, motion(evenly(self.time, self.theta, self.torque)))
+        return identify(SHARED, motion(self.time, self.theta, self.torque))
 
     def coulomb_errors(self, found: Identification) -> tuple[Array, Array]:
         """Error and standard error of Coulomb friction, N m, both directions."""
@@ -196,7 +196,7 @@ def test_the_covariance_in_the_overlay_is_that_of_the_torques_in_the_motion(
     every = np.reshape(model.covariance.values, (len(model.covariance.parameters),) * 2)
     assert np.linalg.eigvalsh(every / np.sqrt(np.outer(every.diagonal(), every.diagonal()))).min() > 0.0
     assert every == pytest.approx(tracked.covariance, rel=1e-4)
-    samples = motion(evenly(planted.time, planted.theta, planted.torque))
+    samples = motion(planted.time, planted.theta, planted.torque)
     regressor = Regressor(SHARED, found.unknowns, samples, found.stribeck_velocity)
     torques, used = regressor.equations(found.values).columns, regressor.equations(found.values).is_used
     own = [found.unknowns.names.index(name) for name in tracked.names if name in found.unknowns.names]
@@ -279,7 +279,7 @@ def test_a_recording_that_contradicts_the_configured_arm_is_refused_with_its_lik
         "lifted all the time": lambda: pressed(planted, (0.0, 0.0, -10.0)),
         "constant of one": lambda: planted.torque * [1.0, 1.0, 0.25, 1.0],
     }.get(what, lambda: planted.torque * scale.get(what, 1.0))()
-    recorded = motion(evenly(planted.time, planted.theta[:, order], torque[:, order]))
+    recorded = motion(planted.time, planted.theta[:, order], torque[:, order])
     found = contradictions(SHARED, recorded, identify(SHARED, recorded))
     assert [one.mistake for one in found[:1]] == ([] if mistake is None else [mistake])
     assert about is None or [one.about for one in found[:1]] == ([] if mistake is None else [about])

@@ -23,23 +23,6 @@ LOADS = {
 }  # topics of forces that the equation of motion does not have, and what each is
 
 
-class MotorRecord(NamedTuple):
-    """Motor states at a constant rate.
-
-    Attributes
-    ----------
-    time : (k,), s.
-    theta : (k, n), rad.
-    torque : (k, n), of the motors at these times, N m.
-    is_used : (k,), False where states are missing or the brakes hold.
-    """
-
-    time: Numbers
-    theta: Numbers
-    torque: Numbers
-    is_used: Mask
-
-
 class MotionSamples(NamedTuple):
     """Samples of the motion, thinned.
 
@@ -84,7 +67,7 @@ def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
     if position is None or effort is None:
         raise BagError(f"{where}: motor_states have no position or no effort; both are needed")
     try:
-        return motion(evenly(columns.stamp_ns / 1e9, position, effort))
+        return motion(columns.stamp_ns / 1e9, position, effort)
     except ValueError as error:
         raise BagError(f"{where}: {error}") from None
 
@@ -102,8 +85,8 @@ def loaded(run: RecordedRun) -> Iterator[str]:
             yield f"{what} in {100.0 * share:.2g} %"
 
 
-def evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotorRecord:
-    """States at a constant rate; where a few are missing, interpolated ones.
+def motion(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotionSamples:
+    """Filtered and thinned samples of motor states.
 
     Parameters
     ----------
@@ -113,7 +96,42 @@ def evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotorRecord:
     Raises
     ------
     ValueError
-        if there are too few states, or stamps do not rise.
+        if there are too few states, stamps do not rise, or less than `shortest` can be used.
+    """
+    time, angles, torque, is_used = _evenly(stamps, theta, effort)
+    period = float(time[1] - time[0])
+    half = max(2, round(0.5 * IDENTIFY.window / period))
+    angle, rate, acceleration = _cubic(half, period)
+    step = max(1, round(IDENTIFY.thinning * 2 * half))
+    centres = np.arange(2 * half, len(time) - 2 * half, step)
+    spans = centres[:, None] + np.arange(-2 * half, 2 * half + 1)
+    centres = centres[is_used[spans].all(1)]
+    if len(centres) * step * period < IDENTIFY.shortest:
+        raise ValueError(
+            f"{len(centres) * step * period:.3g} s of free states without brakes and gaps; "
+            f"identification needs {IDENTIFY.shortest:g} s or more"
+        )
+    windows = centres[:, None] + np.arange(-half, half + 1)
+    torques = _smoothed(torque, angle)
+    # the velocity at each state: also from angles, because that of an encoder is a difference of counts
+    velocities = _smoothed(angles, rate)
+    spread = angles[windows]
+    return MotionSamples(
+        time[centres],
+        np.einsum("w,kwn->kn", angle, spread),
+        np.einsum("w,kwn->kn", rate, spread),
+        np.einsum("w,kwn->kn", acceleration, spread),
+        np.einsum("w,kwn->kn", angle, torque[windows]),
+        velocities[windows],
+        torques[windows],
+        angle,
+    )
+
+
+def _evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> tuple[Numbers, Numbers, Numbers, Mask]:
+    """Time, angles and torques at a constant rate, interpolated where a few are missing; and where they may be used.
+
+    Not used are states that are missing, or under the brakes.
     """
     good = np.isfinite(theta).all(1) & np.isfinite(effort).all(1)
     stamps, theta, effort = stamps[good], theta[good], effort[good]
@@ -137,44 +155,7 @@ def evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotorRecord:
     torque = np.column_stack([np.interp(time, stamps - 0.5 * period, column) for column in effort.T])
     late = np.diff(stamps, append=stamps[-1])[np.searchsorted(stamps, time + 0.01 * period, side="right") - 1]
     is_used = (late <= IDENTIFY.largest_gap * period) & (np.abs(torque) > IDENTIFY.braked).any(1)
-    return MotorRecord(time, theta, torque, is_used)
-
-
-def motion(record: MotorRecord) -> MotionSamples:
-    """Filtered and thinned samples of a record.
-
-    Raises
-    ------
-    ValueError
-        if less than `shortest` of it can be used.
-    """
-    period = float(record.time[1] - record.time[0])
-    half = max(2, round(0.5 * IDENTIFY.window / period))
-    angle, rate, acceleration = _cubic(half, period)
-    step = max(1, round(IDENTIFY.thinning * 2 * half))
-    centres = np.arange(2 * half, len(record.time) - 2 * half, step)
-    spans = centres[:, None] + np.arange(-2 * half, 2 * half + 1)
-    centres = centres[record.is_used[spans].all(1)]
-    if len(centres) * step * period < IDENTIFY.shortest:
-        raise ValueError(
-            f"{len(centres) * step * period:.3g} s of free states without brakes and gaps; "
-            f"identification needs {IDENTIFY.shortest:g} s or more"
-        )
-    windows = centres[:, None] + np.arange(-half, half + 1)
-    torques = _smoothed(record.torque, angle)
-    # the velocity at each state: also from angles, because that of an encoder is a difference of counts
-    velocities = _smoothed(record.theta, rate)
-    theta = record.theta[windows]
-    return MotionSamples(
-        record.time[centres],
-        np.einsum("w,kwn->kn", angle, theta),
-        np.einsum("w,kwn->kn", rate, theta),
-        np.einsum("w,kwn->kn", acceleration, theta),
-        np.einsum("w,kwn->kn", angle, record.torque[windows]),
-        velocities[windows],
-        torques[windows],
-        angle,
-    )
+    return time, theta, torque, is_used
 
 
 def _cubic(half: int, period: float) -> Sequence[Numbers]:

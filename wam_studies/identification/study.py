@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.identification.fit import Identification, identify
-from wam_analysis.identification.motion import MotionSamples, evenly, motion
+from wam_analysis.identification.motion import MotionSamples, motion
 from wam_analysis.identification.overlay import model_values
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.unknowns import DIRECTIONS
@@ -138,7 +138,7 @@ def play(
                 break
     n, values = len(matrix), np.array(rows)
     torque, arrives = signals.of(values[:, n:], np.random.Generator(np.random.PCG64([seed, AT.signals])))
-    return motion(evenly(np.array(stamps)[arrives], values[arrives, :n], torque[arrives])), driver.safety.fault
+    return motion(np.array(stamps)[arrives], values[arrives, :n], torque[arrives]), driver.safety.fault
 
 
 def friction_row(found: Identification, direction: str, load: Array) -> Array:
