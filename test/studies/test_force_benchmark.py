@@ -240,7 +240,7 @@ def trials() -> list[ForceTrial]:
 def test_the_scores_count_what_went_in_and_list_each_failure() -> None:
     scores = STUDY.score(trials())
     rows = {row.name: row for row in scores.rows}
-    silent = rows["wrong force without a reason"]
+    silent = rows["wrong force that nothing reports"]
     assert (silent.found.value, silent.is_missed) == (1, True)
     assert rows["tasks refused with a reason"].found[::3] == (1 / 200, 200)
     outcomes, *_, reasons = scores.tables
@@ -269,7 +269,7 @@ def test_a_task_is_feasible_where_its_force_can_be_known_or_something_does_it() 
     trial = ForceTrial(7, 0, sensed, wrong, {"another": wrong}, knowable=0.5)
     known, done = trial._replace(knowable=0.01), trial._replace(others={"another": right})
     rows = {row.name: row.found for row in STUDY.score([trial, known, done, done._replace(result=right)]).rows}
-    assert rows["right, of the feasible, joint sensors"][::3] == (1 / 3, 3)
+    assert rows["feasible tasks that are right, joint sensors"][::3] == (1 / 3, 3)
 
 
 def test_the_force_can_be_known_worse_the_rougher_the_surface_and_the_less_is_declared() -> None:

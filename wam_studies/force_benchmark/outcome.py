@@ -38,7 +38,7 @@ class TaskEnd(StrEnum):
     REFUSED = "refused with a reason"
     GIVEN_UP = "given up with a reason"
     ENDED = "ended with a reason"
-    SILENT = "silent: wrong force without a reason"
+    SILENT = "silent: wrong force that nothing reports"
 
 
 class TaskTrace(NamedTuple):

@@ -131,7 +131,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
         return Scores(rows, [*_controllers(records), *tables, _reasons(records)])
 
     def failure(self, record: ForceTrial) -> str:
-        """A wrong force without a reason, a force above the limit, an unreported cycle."""
+        """A wrong force that nothing reports, a force above the limit, an unreported cycle."""
         result = record.result
         faults = {
             "silent": result.outcome is TaskEnd.SILENT,
@@ -179,7 +179,7 @@ def _of_feasible(trials: Sequence[ForceTrial]) -> Iterator[Row]:
     for name, allowed in OF_FEASIBLE.items():
         ends = _ends([trial for trial in FEEDBACK.trials(trials, name) if trial.others and _is_feasible(trial)])
         if ends:
-            yield percent(f"right, of the feasible, {name}", share(ends[TaskEnd.DONE], ends.total()), *allowed)
+            yield percent(f"feasible tasks that are right, {name}", share(ends[TaskEnd.DONE], ends.total()), *allowed)
 
 
 def _controllers(trials: Sequence[ForceTrial]) -> Iterator[ScoreTable]:
@@ -214,7 +214,7 @@ def _of_all(trials: Sequence[ForceTrial]) -> Iterator[Row]:
     for is_mistaken, what, required in ((False, "", NONE_AT_ALL), (True, ", the position declared wrongly", ANY)):
         ends = _ends([trial for trial in trials if bool(trial.task.mistake) is is_mistaken])
         silent = exact(ends[TaskEnd.SILENT], ends.total())
-        yield Row(f"wrong force without a reason{what}", silent, "tasks", required=required)
+        yield Row(f"wrong force that nothing reports{what}", silent, "tasks", required=required)
     quiet = _ends([trial for trial in trials if not trial.result.reason])
     done, still = _ends(trials)[TaskEnd.DONE], quiet[TaskEnd.DONE]
     yield percent("tasks within 10 % of which a warning is reported all the same", share(done - still, done))
