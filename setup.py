@@ -124,7 +124,7 @@ name = package.findtext("name")
 # setup.cfg sends to lib/wam_stack.  pip builds a wheel, whose console scripts all land on PATH: there only
 # `wam` is one, and scripts/node is installed in lib/wam_stack under the name of each node.
 ros_build = not {"install", "develop"}.isdisjoint(sys.argv)
-console_scripts = [f"{program} = wam_ros.program:main" for program in PROGRAMS] if ros_build else []
+console_scripts = [f"{program} = wam_cli.program:node" for program in PROGRAMS] if ros_build else []
 launchers = [] if ros_build else [f"build/launchers/{program}" for program in PROGRAMS]
 for launcher in launchers:
     Path(launcher).parent.mkdir(parents=True, exist_ok=True)

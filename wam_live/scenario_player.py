@@ -60,7 +60,7 @@ class ScenarioPlayer:
 
     def ended(self) -> str:
         """How the scenario ended, once; '' before and after."""
-        if self._node is None or (code := self._node.code) is None:
+        if self._node is None or (code := self._node.poll()) is None:
             return ""
         self.stop()
         return (

@@ -1,6 +1,6 @@
 """ROS around the nodes of the stack: the adapter, messages, parameters, recorder and bring-up.
 
-- node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
+- node: the ROS node of a declared node (`wam_description.wiring`)
 - connections: what every node of the stack has on ROS, a driver too, and the other nodes as it hears of them
 - inlets: its subscriptions, from one publisher each; outlets: its publishers, and copies of them for a viewer
 - health: its status, problems, refusals and diagnostics
@@ -14,7 +14,7 @@
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - long_steps: a node that holds up the others of its process
 - processors: one that the driver has to itself in realtime
-- process_signals: signals from the imports of a program to its end; program: that of a node
+- process_signals: signals from the imports of a program to its end
 - conformance: a running driver tested against its contract; driver_bench: the node that does it
 - driver_checks: a function for each row of the contract
 - testing: the test kit; pytest_plugin: its fixtures

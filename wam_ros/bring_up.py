@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from types import MappingProxyType
 from typing import Final
 
@@ -69,8 +68,8 @@ def node_names(configuration: Configuration) -> dict[str, str]:
     return {entry: declared(entry).name for entry in configuration.shared.nodes}
 
 
-class NodeProcess(Closing):
-    """Nodes of a configuration as a process, which can be ended by SIGTERM and started again.
+class NodeProcess(subprocess.Popen[bytes]):
+    """Nodes of a configuration as a process, in a session of its own: Ctrl-C reaches the parent alone.
 
     Parameters
     ----------
@@ -79,6 +78,10 @@ class NodeProcess(Closing):
     namespace : of the nodes.
     log_level : least severity of what they print.
     place : environment in which the process finds its processors.
+
+    Attributes
+    ----------
+    nodes : names of its nodes.
     """
 
     def __init__(
@@ -90,40 +93,18 @@ class NodeProcess(Closing):
         place: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         prepare_logging_directory()
-        self._entries, self._stack = entries, ExitStack()
-        file = self._stack.enter_context(parameter_file(configuration))
-        self._command = [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", "--params-file", str(file)]
-        self._command += ["-r", f"__ns:=/{namespace.strip('/')}", "--log-level", log_level]
-        self._environment = {**os.environ, PARENT: str(os.getpid()), **place}
-        self.start()
-
-    def start(self) -> None:
-        """Start the nodes, in a session of their own: Ctrl-C reaches the parent alone, which stops them in order."""
-        self._process = subprocess.Popen(self._command, start_new_session=True, env=self._environment)
-
-    @property
-    def nodes(self) -> list[str]:
-        """Names of its nodes."""
-        return [declared(entry).name for entry in self._entries]
-
-    @property
-    def code(self) -> int | None:
-        """Exit code where it has ended."""
-        return self._process.poll()
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
-    def send(self, number: signal.Signals) -> None:
-        """Send it a signal; without effect where it has ended."""
-        self._process.send_signal(number)
+        self.nodes = [declared(entry).name for entry in entries]
+        environment = {**os.environ, PARENT: str(os.getpid()), **place}
+        with parameter_file(configuration) as file:
+            command = [sys.executable, "-m", "wam_cli.program", "node", *entries, "--ros-args"]
+            command += ["--params-file", f"/dev/fd/{file.name}", "-r", f"__ns:=/{namespace.strip('/')}"]
+            command += ["--log-level", log_level]
+            super().__init__(command, start_new_session=True, env=environment, pass_fds=[int(file.name)])
 
     def has_ended(self, seconds: float) -> bool:
         """Whether it ends within this time."""
         try:
-            self._process.wait(max(0.0, seconds))
+            self.wait(max(0.0, seconds))
         except subprocess.TimeoutExpired:
             return False
         return True
@@ -131,18 +112,13 @@ class NodeProcess(Closing):
     def kill(self) -> None:
         """End it the hard way."""
         os.killpg(self.pid, signal.SIGKILL)
-        self._process.wait()
-
-    def stop(self) -> None:
-        """End it, the hard way where it does not end by itself."""
-        self.send(signal.SIGTERM)
-        if not self.has_ended(PROCESS_LIMITS.end):
-            self.kill()
+        self.wait()
 
     def close(self) -> None:
-        """End it for good."""
-        self.stop()
-        self._stack.close()
+        """End it, the hard way where it does not end by itself."""
+        self.terminate()
+        if not self.has_ended(PROCESS_LIMITS.end):
+            self.kill()
 
 
 class Processes(Closing):
@@ -184,7 +160,7 @@ class Processes(Closing):
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
-        codes = {name: process.code for name, process in self.processes.items()}
+        codes = {name: process.poll() for name, process in self.processes.items()}
         return {name: 0 if code == -HELD_UP else code for name, code in codes.items() if code is not None}
 
     def wait(self, until: Callable[[dict[str, int]], bool]) -> dict[str, int]:
@@ -209,10 +185,10 @@ class Processes(Closing):
         others = [name for name in self.processes if name not in (*first, LAST)]
         if any(code < 0 for code in before.values()):
             for process in self.processes.values():
-                process.send(LISTENER_GONE)
+                process.send_signal(LISTENER_GONE)
         for names in (first, others):
             for name in names:
-                self.processes[name].send(signal.SIGTERM)
+                self.processes[name].terminate()
             for name in names:
                 if not self.processes[name].has_ended(deadline - time.monotonic()):
                     self._kill(name, "did not end")
@@ -227,7 +203,7 @@ class Processes(Closing):
 
     def _end_recorder(self, recorder: NodeProcess) -> None:
         begin = time.monotonic()
-        recorder.send(signal.SIGTERM)
+        recorder.terminate()
         while not recorder.has_ended(PROCESS_LIMITS.recorder_reports):
             seconds = time.monotonic() - begin
             if seconds > PROCESS_LIMITS.recorder_end:

@@ -2,13 +2,10 @@
 
 import importlib
 import os
-import re
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from functools import partial
-from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +14,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from wam_description.configuration import BASE, Configuration, packaged
+from wam_description.configuration import Configuration
 from wam_description.event import Code, Event, Level, fault
 from wam_description.event_text import sentence
 from wam_description.interface import Feed, declared
-from wam_description.parameters import ParameterError
 from wam_description.signals import NodeStatus
 from wam_description.status import REFUSED
 from wam_description.synchroniser import CURE, Inputs, OutOfTime, Synchroniser
@@ -34,7 +30,6 @@ from wam_ros.messages import Refused
 from wam_ros.requests import Request, RequestQueue
 from wam_ros.ros_parameters import follow
 from wam_ros.ros_topics import SECOND
-from wam_ros.run import run
 
 UNDATED = f"without a stamp it counts as an answer to the newest state, however late it is; {CURE}"
 
@@ -285,23 +280,6 @@ def node_makers(entries: Iterable[str], **ros: Any) -> dict[str, Callable[..., N
     return {declared(entry).name: partial(make_node, entry, **ros) for entry in entries}
 
 
-def main() -> None:
-    """Run the nodes that the name of this program, or its first arguments, name; for `wam_ros.program`."""
-    entries = [Path(sys.argv[0]).name]
-    if entries[0] in ("node", "program.py"):
-        entries = list(takewhile(lambda word: not word.startswith("-"), sys.argv[1:]))
-        if not entries:
-            raise SystemExit("usage: python3 -m wam_ros.program NAME [NAME ...] [--ros-args ...]")
-        del sys.argv[1 : len(entries) + 1]
-    with ExitStack() as files:
-        try:
-            makers = node_makers(entries)
-            arguments = [named_file(given, before, files) for before, given in pairwise(["", *sys.argv])]
-        except ParameterError as error:
-            raise SystemExit(f"error: {error}") from None
-        run(makers, arguments)
-
-
 @contextmanager
 def parameter_file(configuration: Configuration) -> Iterator[Path]:
     """The values of a configuration as a file that ROS reads, as long as the context lasts.
@@ -312,19 +290,3 @@ def parameter_file(configuration: Configuration) -> Iterator[Path]:
         file.write(configuration.text)
         file.flush()
         yield Path(f"/proc/{os.getpid()}/fd/{file.fileno()}")
-
-
-def named_file(given: str, before: str, files: ExitStack) -> str:
-    """An argument of the command line; after --params-file a whole file for a configuration's name or an overlay."""
-    if before != "--params-file":
-        return given
-    path = Path(given)
-    if path.exists() or path.suffix in (".yaml", ".yml"):
-        if not (
-            path.is_file()
-            and re.search(rf"^{BASE}\s*:", path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
-        ):
-            return given  # what ROS can read, or complains about
-    else:
-        path = packaged(given)
-    return str(files.enter_context(parameter_file(Configuration.load(path))))

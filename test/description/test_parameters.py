@@ -289,7 +289,7 @@ def test_an_answer_without_a_result_is_no_success() -> None:
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "wam_ros.program", name, *arguments],
+        [sys.executable, "-m", "wam_cli.program", "node", name, *arguments],
         capture_output=True,
         text=True,
         timeout=LONG,

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -30,7 +29,6 @@ from wam_description.nodes import NODES as TABLE
 from wam_description.parameters import ParameterError
 from wam_description.topics import BY_NAME
 from wam_ros.network import occupant
-from wam_ros.node import named_file
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]
@@ -411,24 +409,10 @@ def test_the_launch_file_in_xml_has_the_same_arguments_and_defaults(prefix, laun
     assert include.get("file") == "$(find-pkg-share wam_stack)/launch/wam.launch.py"
 
 
-def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
-    with ExitStack() as files:
-        taken = [named_file("testbed", before, files) for before in ("--params-file", "-r")]
-        assert Configuration.load(taken[0]).sections == Configuration.load(packaged("testbed")).sections
-        assert taken[1] == "testbed"
-        overlay = tmp_path / "mine.yaml"
-        overlay.write_text("base: testbed\n/**/force_loop:\n  ros__parameters: {force_limit: 7.0}\n")
-        whole = Configuration.load(named_file(str(overlay), "--params-file", files))
-        assert whole.sections["force_loop"]["force_limit"] == 7.0
-        assert whole.sections["/**"] == Configuration.load(packaged("testbed")).sections["/**"]
-        with pytest.raises(ParameterError, match="no configuration 'nosuch' comes with wam_stack"):
-            named_file("nosuch", "--params-file", files)
-
-
 def test_nodes_end_with_the_launch_even_where_it_ends_at_once(launch_file, tmp_path, domain_id):
     _, start = launch_file
     node = next(node for node in start(CHOSEN) if node.executable == "gravity")
-    command = [sys.executable, "-P", "-m", "wam_ros.program", "gravity", "--ros-args", "--params-file"]
+    command = [sys.executable, "-P", "-m", "wam_cli.program", "node", "gravity", "--ros-args", "--params-file"]
     # what `ros2 launch` does with a Node, in a process that SIGTERM ends without another thought
     code = (
         "import os, subprocess, sys, time\n"

@@ -35,7 +35,7 @@ from wam_ros.node import make_node
 
 WIDE_OPEN = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "192.0.2.77"}
 PARAMETERS = ("--ros-args", "--params-file", str(ROOT / "config" / "wam.yaml"))
-PROGRAM = ("-m", "wam_ros.program", "driver", *PARAMETERS)
+PROGRAM = ("-m", "wam_cli.program", "node", "driver", *PARAMETERS)
 LOOPBACK = "0100007F"  # as in /proc/net/udp
 UNLIMITED = {"FASTRTPS_DEFAULT_PROFILES_FILE": "", "SKIP_DEFAULT_XML_FILE": ""}  # as before the tests limit themselves
 
@@ -294,7 +294,7 @@ def test_a_link_that_is_cut_brakes_by_name_and_the_operator_alone_ends_the_fault
     realtime = {"timing.mode": "realtime", "driver:late_periods": 1.0}  # a busy machine is no obstacle
     file.write_text(Configuration.load(packaged("wam")).with_values(realtime).text)
     opened = {**UNLIMITED, SWITCH: OPEN, "ROS_STATIC_PEERS": "10.99.0.1;10.99.0.2"}
-    node = ("-m", "wam_ros.program")
+    node = ("-m", "wam_cli.program", "node")
     programs(*node, "driver", "--ros-args", "--params-file", str(file), before=here, **opened)
     rest = ("transform", "velocity_loop", "gravity", "force_loop", "contact_estimator")
     programs(*node, *rest, "--ros-args", "--params-file", str(file), before=elsewhere, **opened)

@@ -254,7 +254,7 @@ def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_
     processes.close()
     assert processes.killed == []
     assert processes.bag_failure == ""
-    assert processes.processes["recorder"].code == -signal.SIGVTALRM
+    assert processes.processes["recorder"].returncode == -signal.SIGVTALRM
     assert processes.ended() == {"recorder": 0}
     assert list(tmp_path.glob("bags/*/metadata.yaml"))
     printed = capfd.readouterr().err.splitlines()
@@ -307,7 +307,7 @@ PROGRAMS = {
     "node": ("wam_cli.main", "node", "driver"),
     "demo": ("wam_cli.main", "demo", "--no-live"),
     "scorecard": ("wam_cli.main", "model", "scorecard"),
-    "program": ("wam_ros.program", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
+    "program": ("wam_cli.program", "node", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
 }
 
 
@@ -575,12 +575,12 @@ def test_a_node_without_a_package_that_it_needs_ends_with_one_line(tmp_path: Pat
     (tmp_path / "pinocchio.py").write_text("raise ModuleNotFoundError('gone', name='pinocchio')")
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "wam_ros.program", "driver"],
+        [sys.executable, "-P", "-m", "wam_cli.program", "node", "driver"],
         env={**os.environ, "PYTHONPATH": path},
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 1
-    assert done.stderr.startswith("error: the Python package 'pinocchio' is missing; ")
+    assert done.stderr.startswith("wam node: it needs 'pinocchio', which is not installed; ")
     assert len(done.stderr.splitlines()) == 1

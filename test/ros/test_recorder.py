@@ -106,7 +106,7 @@ def listening(ros: Any) -> list[Any]:
 def recorder_process(ros: Any, directory: Path, **choices: Any) -> Iterator[subprocess.Popen[str]]:
     file = directory / "recorder.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters(directory, **choices)}}))
-    command = [sys.executable, "-m", "wam_ros.program", "recorder", "--ros-args", "-r", "__ns:=/wam"]
+    command = [sys.executable, "-m", "wam_cli.program", "node", "recorder", "--ros-args", "-r", "__ns:=/wam"]
     process = subprocess.Popen(
         [*command, "--params-file", str(file)],
         env=ros.environment,

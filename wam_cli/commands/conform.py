@@ -95,16 +95,21 @@ def run(given: argparse.Namespace) -> int:
     ):
         timing = configuration.shared.timing
         set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
-        driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[:1], given.namespace)
+        started: list[NodeProcess] = []
+
+        def start() -> None:
+            started.append(NodeProcess(configuration, configuration.shared.nodes[:1], given.namespace))
+
         try:
-            if driver:
-                bench.end, bench.restart = driver.stop, driver.start
+            if not given.running:
+                start()
+                bench.end, bench.restart = started[-1].close, start
             for row in conformance_rows(bench, given.attempts):
                 counts[row.verdict] += 1
                 print(row.text)
                 sys.stdout.flush()
         finally:
-            if driver:
+            for driver in started:
                 driver.close()
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return int(counts[WRONG] > 0)

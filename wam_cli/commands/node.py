@@ -2,12 +2,13 @@
 
 import argparse
 
-from wam_cli.options import configuration_of, take_configuration
+from wam_cli.options import BASE_CONFIGURATION, configuration_of, take_configuration
 from wam_ros.node import node_makers, parameter_file
 from wam_ros.process_signals import end_at_once_on_signals
 from wam_ros.run import run as run_node
 
 TAKES_ROS_ARGUMENTS = True
+PARAMETERS = "--params-file"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,7 +16,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     known = "driver, transform, velocity_loop, gravity, force_loop, ...; several share one process"
     parser.add_argument("name", nargs="+", help=known)
     parser.usage = "wam node [OPTION...] NAME... [ROS ARGUMENT...]"
-    parser.epilog = "ROS arguments are for example: -p timing.mode:=lockstep -r __ns:=/left"
+    parser.epilog = (
+        "ROS arguments are for example: -p timing.mode:=lockstep -r __ns:=/left.  A --params-file takes the place of "
+        "the packaged configuration."
+    )
     take_configuration(parser)
 
 
@@ -23,6 +27,8 @@ def run(given: argparse.Namespace) -> int:
     """Run the nodes until they are stopped."""
     end_at_once_on_signals()  # until run_node handles them; an exception would break the import of the node
     makers = node_makers(given.name)
+    is_of_ros = PARAMETERS in given.ros and given.config == BASE_CONFIGURATION and not given.values
     with parameter_file(configuration_of(given)) as file:
-        run_node(makers, ["wam", "--ros-args", "--params-file", str(file), *given.ros])
+        own = [] if is_of_ros else [PARAMETERS, str(file)]
+        run_node(makers, ["wam", "--ros-args", *own, *given.ros])
     return 0

@@ -42,11 +42,11 @@ class NodeProcesses(StackClient):
 
     def __init__(self, configuration: Configuration) -> None:
         super().__init__(name="watcher", shared=configuration.shared)
-        self.processes = {
-            name: NodeProcess(configuration, [name], NAMESPACE, "fatal")
-            for name in ANSWERS
-            if name in configuration.shared.nodes
-        }
+        self._configuration = configuration
+        self.processes: dict[str, NodeProcess] = {}
+        for name in ANSWERS:
+            if name in configuration.shared.nodes:
+                self.start(name)
         self.stamps = dict.fromkeys(self.processes, 0)
         self.current_stamp = 0
         self.q: list[float] = []
@@ -59,10 +59,14 @@ class NodeProcesses(StackClient):
         self.listen("sim/joint_states", self._take_angles, "position")
         self.listen("sim/contact/wrench", self._take_force)
 
+    def start(self, name: str) -> None:
+        """Start a node."""
+        self.processes[name] = NodeProcess(self._configuration, [name], NAMESPACE, "fatal")
+
     def close(self) -> None:
         """End all nodes."""
         for process in self.processes.values():
-            process.send(signal.SIGKILL)
+            process.send_signal(signal.SIGKILL)
             process.close()
         super().close()
 
@@ -132,21 +136,21 @@ def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals)
     chain.watch(chance.uniform(0.0, 0.1))
     q, chain.force = list(chain.q), 0.0
     process = chain.processes[name]
-    process.send(way)
+    process.send_signal(way)
     delay, escapes = math.nan, list[str]()
     if name == "driver":
         chain.watch(chance.uniform(*FAULTS.frozen) if way == signal.SIGSTOP else 0.2)
     else:
         delay = _noticed(chain, name, escapes)
     if way == signal.SIGSTOP:
-        process.send(signal.SIGCONT)
-    elif not chain.wait(lambda: process.code is not None, FAULTS.noticed):
+        process.send_signal(signal.SIGCONT)
+    elif not chain.wait(lambda: process.poll() is not None, FAULTS.noticed):
         process.kill()
-    others = [one for one, other in chain.processes.items() if one != name and other.code is not None]
+    others = [one for one, other in chain.processes.items() if one != name and other.poll() is not None]
     if others:
         escapes.append(f"{', '.join(others)} ended, too")
     if way != signal.SIGSTOP:
-        process.start()
+        chain.start(name)
     if reason := chain.enabled():
         escapes.append(reason)
     is_new_arm = name == "driver" and way != signal.SIGSTOP
