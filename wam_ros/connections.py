@@ -78,15 +78,18 @@ class StackNode(TolerantNode):
     shared, own : parameters.
     interface : of the bring-up; names which peers to expect.
     is_first : whether it works in each inner period, and is to be ahead of the other nodes.
+    is_alone : whether no other node of its name may run in its namespace.
     """
 
     is_first = False
+    is_alone = True
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration.name, **ros)
         require_name(self, declaration.name)
-        self._place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
         self.shared, self.own = declare(self, declaration.parameter_class)
+        if self.is_alone:
+            self._place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
         self.interface = Interface(self.shared, started_by_hand=declaration)
         topics = self.interface.topics
         rows = [topics[topic] for topic in declaration.outputs if topic in topics]
@@ -163,4 +166,5 @@ class StackNode(TolerantNode):
         self.health.report_end()
         self.outlets.wait_for_delivery()
         super().destroy_node()
-        self._place.close()
+        if self.is_alone:
+            self._place.close()

@@ -114,7 +114,7 @@ class Health:
 
     def _whole(self, status: NodeStatus) -> NodeStatus:
         """A status with what the other nodes compare, and take, of the shared parameters."""
-        facts = {**status.facts, DIGESTS: self.digests}
+        facts = {**status.facts, DIGESTS: self.digests} if self.digests else status.facts
         return status._replace(node=self._node.get_name(), connected=self.is_ready, facts=facts)
 
     def _send(self, status: NodeStatus) -> None:

@@ -5,72 +5,60 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 
 from wam_bag.bag_name import dated
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
-from wam_description.event import Level
-from wam_description.interface import Interface
+from wam_description.event import RAISED, Level
+from wam_description.interface import declared
 from wam_description.parameters import ParameterError, values
 from wam_description.signals import NodeStatus
-from wam_description.status import diagnosed_name
-from wam_description.topics import BY_NAME, DEPTH, EVERY_NODE, STATUS, Topic
+from wam_description.topics import DEPTH, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text
-from wam_ros.health import ENDED, NODE, PUBLISHED, READY
+from wam_ros.connections import StackNode
+from wam_ros.health import ENDED, NODE, PUBLISHED, problem_of
 from wam_ros.limits import RECORDER_LIMITS
-from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
-from wam_ros.network import require_name
+from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.recorded_stack import RecordedStack
 from wam_ros.recorder import Recorder
-from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
-from wam_ros.ros_parameters import declare
-from wam_ros.ros_topics import DIAGNOSTICS, listening, qos, topic_name
-from wam_ros.tolerance import TolerantNode
+from wam_ros.recorder_interface import EVERY, RecorderInterface
+from wam_ros.ros_topics import DIAGNOSTICS, listening, topic_name
 from wam_ros.wire import deserialized
 
+RECORDER = RecorderInterface.name
 
-class RecorderNode(TolerantNode):
+
+class RecorderNode(StackNode):
     """Records from construction to `destroy_node`, which closes the bag."""
 
+    is_alone = False
+
     def __init__(self, **ros: Any) -> None:
-        super().__init__("recorder", **ros)
-        require_name(self, "recorder")
-        shared, own = declare(self, RecorderParameters)
-        self._own_parameters = {**values(shared), **values(own)}
-        self._arm = shared.arm.name
-        self._required = own.required
+        super().__init__(declared(RECORDER), **ros)
+        shared, own, interface = self.shared, self.own, self.interface
+        self.health.digests = ""  # no arm brakes for how it is recorded
         name = own.name or dated(shared.arm.name)
         try:
             self.bag = BagWriter(Path(own.directory) / name, Split(own.split_size, own.split_time))
         except RecordingError as error:
-            raise ParameterError(f"node 'recorder': {error} (parameters 'directory' and 'name')") from None
-        interface = Interface(shared)
+            raise ParameterError(f"node '{RECORDER}': {error} (parameters 'directory' and 'name')") from None
         topics = {self.resolve_topic_name(topic_name(self, topic)): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, self._writers, self.get_namespace())
-        self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
         self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
         stampless_first = sorted(topics.items(), key=lambda item: not item[1].latched)
-        self._inlets = {name: self._listen(name, topic) for name, topic in stampless_first}
-        own_name = RecorderInterface.name
-        self._nodes = frozenset(interface.names) - {own_name}
-        self._ends_last = own_name in interface.names  # one that was started by hand may end before the others
-        self._unfinished = set(self._nodes) if self._ends_last else set()  # nodes without a final count
-        self._expected = {full: len({*interface.publishers(row.name)} - {own_name}) for full, row in topics.items()}
-        self.stack = RecordedStack(self, shared, self._nodes, str(self.bag.path))
-        self._status, self._diagnostics = (
-            self.create_publisher(message_type(row), row.name, qos(row)) for row in map(BY_NAME.__getitem__, EVERY_NODE)
-        )
-        self.ready = False
+        self._drained = {name: self._listen(name, topic) for name, topic in stampless_first}
+        self._ends_last = RECORDER in interface.names  # one that was started by hand may end before the others
+        self._unfinished = set(self.peers.names) if self._ends_last else set()  # nodes without a final count
+        self.stack = RecordedStack(self, shared, self.peers.names, str(self.bag.path))
         self._attached = ""
-        self._failed = False
         self._has_heard = False  # others, recorded or not
         self.create_timer(RECORDER_LIMITS.drain_period, self._drain)
         self.create_timer(0.1, self.attend)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
-            self.create_timer(1.0, self._report)
+            self.create_timer(1.0, lambda: self.health.report(time.time_ns(), self._facts))
         self.get_logger().info(f"recording to {self.bag.path}")
 
     def destroy_node(self) -> None:
@@ -95,16 +83,27 @@ class RecorderNode(TolerantNode):
             return ""
         return f"{self.bag.path} is empty: no message came; start the stack with 'wam up' before the recorder"
 
-    def take_fault(self, reason: str) -> None:
-        """Report what a callback raised; a recorder that fails in this way may lack messages."""
-        self._status.publish(self._state(reason or self.recorder.failure or "recording", reason))
+    def raise_priority(self) -> None:
+        """It has time."""
+
+    def is_waiting(self) -> bool:
+        """Whether it lacks the parameters of a node, or cannot write."""
+        return bool(self.recorder.failure or self.stack.parameters.missing)
+
+    def report_ready(self) -> None:
+        """All nodes are there: attach their parameters now, so that a killed recorder leaves them."""
+        self._attach_parameters()
+        super().report_ready()
 
     def _listen(self, name: str, topic: Topic) -> Any:
-        subscription = self.create_subscription(
-            message_type(topic), name, lambda data: None, listening(topic), raw=True
-        )
-        self.leave_unserved(subscription)  # `_drain` fetches its messages
-        return subscription
+        """Subscribe to what `_drain` fetches."""
+        found = self.inlets.subscriptions
+        if topic.name not in found:
+            found[topic.name] = self.create_subscription(
+                message_type(topic), name, lambda data: None, listening(topic), raw=True
+            )
+        self.leave_unserved(found[topic.name])
+        return found[topic.name]
 
     def _take_totals(self, data: bytes) -> None:
         """Take what the nodes report about the messages that they have published."""
@@ -114,7 +113,7 @@ class RecorderNode(TolerantNode):
             return
         for facts in (read_status(status).facts for status in message.status[: RECORDER_LIMITS.statuses]):
             namespace, _, node = facts.get(NODE, "").rpartition("/")
-            if node not in self._nodes or namespace != self.get_namespace().rstrip("/"):
+            if node not in self.peers.names or namespace != self.get_namespace().rstrip("/"):
                 continue  # a node of another arm
             for key, value in facts.items():
                 topic = key.removeprefix(PUBLISHED)
@@ -134,54 +133,33 @@ class RecorderNode(TolerantNode):
         }
 
     def attend(self) -> None:
-        """Ten times a second: flush, warn, request parameters, publish `ready` when all nodes are there."""
+        """Ten times a second: flush, warn, request parameters."""
         self.recorder.flush()
-        self._warn()
         self.stack.attend(self._writers(STATUS))
-        if self.ready or self.stack.parameters.missing or self._is_unmatched():
-            return
-        self._attach_parameters()  # now, so that a killed recorder leaves them
-        if not self.recorder.failure:  # a scenario starts when all are ready
-            self.ready = True
-            self._status.publish(diagnostic_status(READY._replace(node=self.get_name()), self._arm))
-
-    def _is_unmatched(self) -> bool:
-        return any(one.get_publisher_count() < self._expected[name] for name, one in self._inlets.items())
-
-    def _warn(self) -> None:
-        if self.recorder.failure and not self._failed:
-            self._failed = True
-            self.get_logger().error(self.recorder.failure)
-            self._status.publish(self._state(self.recorder.failure, self.recorder.failure if self._required else ""))
+        if failure := self.recorder.failure:
+            if self.own.required:
+                self.health.set_problem("bag", problem_of(RAISED, failure))
+            else:
+                self.get_logger().error(failure, once=True)
+                self.health.publish(NodeStatus(Level.ERROR, failure))
         if self.recorder.dropped():
             self.get_logger().warning(
                 "the recorder is too slow and loses messages; it counts them when it ends", once=True
             )
 
-    def _report(self) -> None:
-        state = self._state("recording")
-        state.name = diagnosed_name(self.get_namespace(), state.name)
-        message = DiagnosticArray(status=[state])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
-
-    def _state(self, text: str, fault: str = "") -> DiagnosticStatus:
+    def _facts(self) -> dict[str, str]:
         counts = self.recorder.counts()
-        facts = {
+        return {
             "bag": str(self.bag.path),
             "received": str(sum(count.received for count in counts)),
             "dropped": str(sum(count.dropped for count in counts)),
             "lost_at_disk": str(self.recorder.lost_at_disk),
         }
-        level = Level.ERROR if self.recorder.failure or fault else Level.OK
-        return diagnostic_status(
-            NodeStatus(level, text, self.get_name(), connected=self.ready, fault=fault, facts=facts), self._arm
-        )
 
     def _drain(self) -> None:
         """Record what has arrived, in the order in which it was sent: the time of a message may be that before it."""
         arrived: list[tuple[int, str, bytes, int, int]] = []
-        for name, subscription in self._inlets.items():
+        for name, subscription in self._drained.items():
             with subscription.handle:
                 for _ in range(DEPTH):
                     taken = subscription.handle.take_message(subscription.msg_type, True)
@@ -195,14 +173,14 @@ class RecorderNode(TolerantNode):
         for sent, name, data, received, number in arrived:
             self._has_heard |= name not in self._own_topics
             self.recorder.receive(name, data, received, sent, number)
-            if name == self._diagnostics_name:
+            if name == self.outlets.full[DIAGNOSTICS]:
                 self._take_totals(data)
 
     def _attach_parameters(self) -> None:
         """Attach the known parameters, if these are more than were attached before."""
         found = self.stack.parameters.found
         parameters = {self.resolve_service_name(node): given for node, given in found.items()}
-        parameters[self.get_fully_qualified_name()] = self._own_parameters
+        parameters[self.get_fully_qualified_name()] = {**values(self.shared), **values(self.own)}
         text = parameter_text(parameters)
         if text != self._attached and self.recorder.attach("parameters.yaml", "application/yaml", text.encode()):
             self._attached = text

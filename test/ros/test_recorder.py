@@ -262,7 +262,7 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
     ros.add(other)
     ros.wait(lambda: not node.stack.parameters.missing)
     node.attend()
-    assert not node.ready, "ready before the topics of gravity were there"
+    assert not node.health.is_ready, "ready before the topics of gravity were there"
     kept = [publisher(other, topic) for topic in ("gravity_effort", "status", "/diagnostics")]
     ros.wait(lambda: states)
     assert kept
