@@ -13,7 +13,7 @@ from rclpy.logging import get_logger
 
 from wam_description.configuration import Configuration
 from wam_description.interface import declared, require_parameters
-from wam_description.nodes import EACH, ONE
+from wam_description.nodes import EACH
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.network import require_places
 from wam_ros.node import node_makers, parameter_file
@@ -23,49 +23,8 @@ from wam_ros.ros_topics import NAMESPACE
 from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory
 
 LOGGER: Final = get_logger("wam")
-# codes of a recorder that SIGTERM ended before it had a bag
-NOT_BEGUN: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)
-
-
-def start(
-    configuration: Configuration,
-    processes: str,
-    is_stopped: Callable[[], bool],
-    namespace: str = NAMESPACE,
-    log_level: str = "info",
-) -> "Composition | Processes":
-    """Start the nodes of a configuration.
-
-    Parameters
-    ----------
-    configuration : values for all nodes; its `shared.nodes` names which ones are started.
-    processes : ONE, GROUPED or EACH, of `wam_description.nodes`; ONE is this one.
-    is_stopped : whether the start is to be broken off.
-    namespace : namespace of the nodes.
-    log_level : least severity of what they print.
-
-    Raises
-    ------
-    ParameterError
-        where there is no such node, one of this name already runs in this namespace, or a value is not allowed.
-    """
-    names = node_names(configuration)
-    require_places(names.values(), namespace)
-    require_parameters(configuration)
-    if processes == ONE:
-        return Composition(configuration, namespace, None, is_stopped, log_level)
-    return Processes(configuration, namespace, log_level, processes)
-
-
-def node_names(configuration: Configuration) -> dict[str, str]:
-    """Names of the nodes of a bring-up by their entries in the parameter `nodes`.
-
-    Raises
-    ------
-    ParameterError
-        where there is no such node.
-    """
-    return {entry: declared(entry).name for entry in configuration.shared.nodes}
+# codes of a recorder whose bag is whole, or that SIGTERM ended before it had one
+NO_FAILURE: Final = (0, -signal.SIGTERM, 128 + signal.SIGTERM)
 
 
 class NodeProcess(subprocess.Popen[bytes]):
@@ -129,13 +88,18 @@ class Processes(Closing):
     configuration : values for all nodes; its `shared.nodes` names which ones are started.
     namespace : namespace of the nodes.
     log_level : least severity of what they print.
-    processes : GROUPED or EACH, of `wam_description.nodes`; a process of several nodes is named for all of them.
+    processes : ONE, GROUPED or EACH, of `wam_description.nodes`; a process of several nodes is named for all of them.
 
     Attributes
     ----------
     processes : by the names of their nodes.
     killed : nodes that did not end by themselves.
     bag_failure : after the end, why the bag is not whole; '' where it is, or where nothing was recorded.
+
+    Raises
+    ------
+    ParameterError
+        where there is no such node, one of this name already runs in this namespace, or a value is not allowed.
     """
 
     bag_failure = ""
@@ -147,19 +111,15 @@ class Processes(Closing):
         log_level: str = "info",
         processes: str = EACH,
     ) -> None:
-        names = node_names(configuration)
+        require_places([declared(entry).name for entry in configuration.shared.nodes], namespace)
+        require_parameters(configuration)
         self.killed: list[str] = []
-        self.processes = {
-            ", ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
-            for group, place in placed_groups(configuration.shared, processes)
-        }
-
-    def nodes_of(self, process: str) -> list[str]:
-        """The nodes in a process."""
-        return self.processes[process].nodes
+        groups = placed_groups(configuration.shared, processes)
+        started = [NodeProcess(configuration, group, namespace, log_level, place) for group, place in groups]
+        self.processes = {", ".join(process.nodes): process for process in started}
 
     def ended(self) -> dict[str, int]:
-        """Exit codes of the nodes that have ended, by name."""
+        """Exit codes of the processes that have ended, by name."""
         codes = {name: process.poll() for name, process in self.processes.items()}
         return {name: 0 if code == -HELD_UP else code for name, code in codes.items() if code is not None}
 
@@ -171,18 +131,19 @@ class Processes(Closing):
 
     @property
     def failures(self) -> list[str]:
-        """Nodes that have ended and should not have; why, they have printed themselves."""
-        return [f"{process_of(self.nodes_of(name))} {_ending(code)}" for name, code in self.ended().items() if code]
+        """Processes that have ended and should not have; why, they have printed themselves."""
+        return [f"{process_of(name)} {_ending(code)}" for name, code in self.ended().items() if code]
 
     def close(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
 
-        All nodes but the recorder have one deadline together.
+        All processes but that of the recorder have one deadline together.
         """
         deadline = time.monotonic() + PROCESS_LIMITS.end
         before = self.ended()
-        first = [name for name in self.processes if FIRST in self.nodes_of(name)]
-        others = [name for name in self.processes if name not in (*first, LAST)]
+        recorder = next((name for name, process in self.processes.items() if LAST in process.nodes), "")
+        others = [name for name in self.processes if name != recorder]
+        first = [name for name in others if FIRST in self.processes[name].nodes]
         if any(code < 0 for code in before.values()):
             for process in self.processes.values():
                 process.send_signal(LISTENER_GONE)
@@ -192,34 +153,33 @@ class Processes(Closing):
             for name in names:
                 if not self.processes[name].has_ended(deadline - time.monotonic()):
                     self._kill(name, "did not end")
-        if recorder := self.processes.get(LAST):
+        if recorder:
             self._end_recorder(recorder)
-        if (code := self.ended().get(LAST)) and code not in NOT_BEGUN:
-            self.bag_failure = f"the recorder ended with code {code}; the bag may lack messages"
-        elif before.get(LAST) == 0 and others:
+        code = self.ended().get(recorder, 0)
+        if recorder not in before and code not in NO_FAILURE:
+            self.bag_failure = f"{process_of(recorder)} ended with code {code}; the bag may lack messages"
+        elif before.get(recorder) == 0 and others:
             self.bag_failure = "the recorder ended before the other nodes; the bag lacks what they published after it"
-        for process in self.processes.values():
-            process.close()
 
-    def _end_recorder(self, recorder: NodeProcess) -> None:
-        begin = time.monotonic()
-        recorder.terminate()
-        while not recorder.has_ended(PROCESS_LIMITS.recorder_reports):
+    def _end_recorder(self, name: str) -> None:
+        begin, process = time.monotonic(), self.processes[name]
+        process.terminate()
+        while not process.has_ended(PROCESS_LIMITS.recorder_reports):
             seconds = time.monotonic() - begin
             if seconds > PROCESS_LIMITS.recorder_end:
-                self._kill(LAST, f"did not end within {seconds:.0f} s; 'wam bag repair' closes its bag")
+                self._kill(name, f"did not end within {seconds:.0f} s; 'wam bag repair' closes its bag")
             else:
                 LOGGER.warning(f"waiting for the recorder to write the bag, {seconds:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
-        LOGGER.error(f"{process_of(self.nodes_of(name))} is killed: it {reason}")
+        LOGGER.error(f"{process_of(name)} is killed: it {reason}")
         self.killed.append(name)
         self.processes[name].kill()
 
 
-def process_of(nodes: Sequence[str]) -> str:
+def process_of(nodes: str) -> str:
     """What a message calls a process: its node, or the nodes that share it."""
-    return f"the process of the nodes {', '.join(nodes)}" if len(nodes) > 1 else f"node {nodes[0]}"
+    return f"the process of the nodes {nodes}" if "," in nodes else f"node {nodes}"
 
 
 def _ending(code: int) -> str:
@@ -240,51 +200,12 @@ class Composition(Nodes):
     configuration : values for all nodes; its `shared.nodes` names which ones are made.
     namespace : namespace of the nodes.
     domain_id : ROS domain, the one of the environment where None.
-    is_stopped : no further node is made once it is true.
-    log_level : least severity of what they print.
-
-    Attributes
-    ----------
-    killed : none, as nodes of this process end by themselves.
     """
 
-    killed: tuple[str, ...] = ()
-    bag_failure = ""
-
-    def __init__(
-        self,
-        configuration: Configuration,
-        namespace: str = NAMESPACE,
-        domain_id: int | None = None,
-        is_stopped: Callable[[], bool] = lambda: False,
-        log_level: str = "info",
-    ) -> None:
+    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
         with parameter_file(configuration) as file:
             own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
-            makers = node_makers(configuration.shared.nodes, **own)
-            arguments = ["wam", "--ros-args", "--log-level", log_level]
-            super().__init__(makers, arguments, namespace, domain_id, is_stopped)
-        self._may_end = {
-            name: node for name, node in self.nodes.items() if hasattr(getattr(node, "node", node), "done")
-        }
-
-    def nodes_of(self, process: str) -> list[str]:
-        """The node of what counts as a process."""
-        return [process]
-
-    def ended(self) -> dict[str, int]:
-        """Exit codes of the nodes that have ended, by name, as if they were processes."""
-        return {name: int(bool(node.failure)) for name, node in self._may_end.items() if node.done}
-
-    @property
-    def failures(self) -> list[str]:
-        """Why nodes have ended that should not have."""
-        return [node.failure for node in self._may_end.values() if node.done and node.failure]
-
-    def wait(self, until: Callable[[dict[str, int]], bool]) -> dict[str, int]:
-        """Spin until the exit codes seen so far satisfy a condition; returns them."""
-        self.spin(lambda: until(self.ended()))
-        return self.ended()
+            super().__init__(node_makers(configuration.shared.nodes, **own), (), namespace, domain_id)
 
     def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> str:
         """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it.
@@ -297,10 +218,3 @@ class Composition(Nodes):
         scenario, driver = self.nodes["scenario"], self.nodes["driver"]
         self.spin(lambda: is_stopped(driver.driver.stamp / 1e9) or bool(scenario.done))
         return str(scenario.failure)
-
-    def close(self) -> None:
-        """Destroy the nodes, driver first, recorder last."""
-        recorder = self.nodes.get(LAST)
-        super().close()
-        self.bag_failure = str(getattr(recorder, "failure", ""))
-        self.nodes.clear()

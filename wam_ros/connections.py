@@ -166,5 +166,4 @@ class StackNode(TolerantNode):
         self.health.report_end()
         self.outlets.wait_for_delivery()
         super().destroy_node()
-        if self.is_alone:
-            self._place.close()
+        self._place.close()

@@ -45,6 +45,8 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
     """
     groups = process_groups(shared.nodes, processes)
     permitted = os.sched_getaffinity(0)
+    if len(groups) == 1:
+        return [(groups[0], {})]
     if shared.timing.mode == "lockstep":
         closest, policy = CLOSEST, [WAITING]
     elif len(permitted) >= PROCESS_LIMITS.processors and fifo_is_granted(shared.timing.fifo_priority):

@@ -31,11 +31,6 @@ def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
     """
     given = {name: _plain(parameter) for name, parameter in node._parameter_overrides.items() if name not in OWN_NAMES}
     shared_names = {field.name for field in fields(Shared)}
-    if not given:
-        raise ParameterError(
-            f"node '{node.get_name()}' has no parameters; start it with --ros-args --params-file config/wam.yaml, "
-            "or with 'wam node'"
-        )
     name, where = node.get_name(), f"section '{SHARED}'"
     try:
         shared = build(Shared, {key: value for key, value in given.items() if key in shared_names})

@@ -170,7 +170,6 @@ class Nodes(Connection):
     makers : what makes each node, by its name; called with ``context`` and ``namespace``.
     arguments, domain_id : as for `Connection`.
     namespace : of the nodes.
-    is_stopped : no further node is made once it is true.
 
     Attributes
     ----------
@@ -183,15 +182,13 @@ class Nodes(Connection):
         arguments: Sequence[str],
         namespace: str = NAMESPACE,
         domain_id: int | None = None,
-        is_stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__(arguments, domain_id)
         BUSES[self.context] = LocalBus(self.executor, makers)
         self.nodes: dict[str, Any] = {}
         try:
             for name, make in makers.items():
-                if not is_stopped():
-                    self.nodes[name] = self.add(make(context=self.context, namespace=namespace))
+                self.nodes[name] = self.add(make(context=self.context, namespace=namespace))
         except BaseException:
             self.close()
             raise

@@ -330,10 +330,3 @@ def test_a_wrong_parameter_stops_the_process_with_its_name(
 def test_a_parameter_on_the_command_line_wins_over_the_file(domain_id: int) -> None:
     done = run_node("driver", "--ros-args", "--params-file", str(packaged("wam")), "-p", "watchdog:=0.5")
     assert "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05" in done.stderr
-
-
-def test_a_node_without_parameters_says_where_they_are(domain_id: int) -> None:
-    done = run_node("gravity")
-    assert done.returncode == 1
-    assert "start it with --ros-args --params-file config/wam.yaml, or with 'wam node'" in done.stderr
-    assert "Traceback" not in done.stderr

@@ -5,7 +5,6 @@ import math
 import os
 import shlex
 import sys
-import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -35,7 +34,6 @@ EXIT_CODES = (
     "130 if you stopped it."
 )
 PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
-LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
 WITHOUT_ROS = (
     "ROS is not installed (no rclpy): the same nodes run in this process and give the same numbers, but there are no "
     "topics and no live page; for these: pip install 'wam_stack[ros,live]'"
@@ -214,27 +212,17 @@ def _stated(seconds: float, step: str) -> None:
 
 def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> PlayedDemo:
     from wam_cli.commands.live import page_next_to
-    from wam_cli.commands.up import import_nodes
-    from wam_ros.bring_up import start
+    from wam_ros.bring_up import Processes
     from wam_ros.ros_topics import NAMESPACE
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
-    import_nodes(configuration, given)
     stop = Stop()
-    late = time.monotonic() + LONGEST_START
     with (
         page_next_to(given, NAMESPACE, lambda: stop.is_set) as close_page,
-        start(configuration, processes_of(configuration, given), lambda: stop.is_set) as stack,
+        Processes(configuration, processes=processes_of(configuration, given)) as stack,
     ):
-        driver: Any = getattr(stack, "nodes", {}).get("driver")
-
-        def is_over(ended: dict[str, int]) -> bool:
-            return stop.is_set or bool(ended) or (time.monotonic() > late and bool(getattr(driver, "awaited", "")))
-
-        ended = stack.wait(is_over)
+        stack.wait(lambda ended: stop.is_set or bool(ended))
         failures = stack.failures
-        if not ended and not stop.is_set:
-            failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
         for failure in failures:  # before the others end and print what follows from it
             print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
         close_page()

@@ -18,10 +18,7 @@ from wam_cli.options import (
     timed,
 )
 from wam_control.task.scenario import load_for
-from wam_description.configuration import Configuration
-from wam_description.nodes import ONE
-from wam_ros.bring_up import Processes, process_of, start
-from wam_ros.node import node_factory
+from wam_ros.bring_up import Processes, process_of
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_ros.run import die_with_parent
 
@@ -40,13 +37,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     take_page(parser, default=False)
     take_configuration(parser)
-
-
-def import_nodes(configuration: Configuration, given: argparse.Namespace) -> None:
-    """Import what the nodes need, while a signal may still end the program at once."""
-    if processes_of(configuration, given) == ONE:
-        for entry in configuration.shared.nodes:
-            node_factory(entry)
 
 
 def run(given: argparse.Namespace) -> int:
@@ -70,26 +60,25 @@ def run(given: argparse.Namespace) -> int:
                 f"{given.scenario}: step '{pushing}' has a push, which the driver of this arm does not take; leave out "
                 "the key push; a real arm is pushed by hand, that of a simulated bus cannot be pushed"
             )
-    import_nodes(configuration, given)
     stop = Stop()
     processes = processes_of(configuration, given)
     with (
         page_next_to(given, given.namespace, lambda: stop.is_set) as close_page,
-        start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
+        Processes(configuration, given.namespace, given.log_level, processes) as stack,
     ):
-        each = stack.processes if isinstance(stack, Processes) else ()
+        each = stack.processes
         if not stop.is_set:
-            where = f"{len(each)} processes ({'; '.join(each)})" if each else "this process"
+            where = f"{len(each)} processes ({'; '.join(each)})" if len(each) > 1 else "one process"
             print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
-        for failure in stack.failures if each else []:  # a node of this process has printed it
+        for failure in stack.failures:
             print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
         close_page()
     is_played = False
     for process, code in ended.items():
-        nodes = stack.nodes_of(process)
-        is_played |= "scenario" in nodes
-        who = "the scenario" if "scenario" in nodes else process_of(nodes)
+        is_scenario = "scenario" in each[process].nodes
+        is_played |= is_scenario
+        who = "the scenario" if is_scenario else process_of(process)
         print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
     if given.scenario and is_played and not any(ended.values()):
         seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
