@@ -350,7 +350,7 @@ def dither(configuration: Configuration) -> str:
         ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
         ["amplitude divided by static friction of motor and joints", f"{own.level:g}"],
         ["motion of the tool without friction, peak to peak", f"{1e3 * cost.tip_motion:.2g} mm"],
-        ["heat of the hottest winding, of its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
+        ["heat of the hottest winding, fraction of its continuous rating", f"{100.0 * max(cost.heat):.2g} %"],
     ]
     return markdown(["the dither", ""], rows)
 
