@@ -10,8 +10,8 @@ from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
 
 REASONS: Final = {
-    Reason.MOMENT_ONLY: "on this link only the moment is measured, so the contact position is unknown and the force is "
-    "a lower bound",
+    Reason.MOMENT_ONLY: "on this link only the moment is measured: the contact position is unknown, and the estimated "
+    "force is a lower bound",
     Reason.BENT: "elbow at 90 deg and force in the plane of the arm: contact position and force cannot be separated",
     Reason.STRAIGHT: "elbow straight and force across the plane of the arm: contact position and force cannot be "
     "separated",
@@ -20,34 +20,36 @@ REASONS: Final = {
     Reason.ELBOW: "torque of the elbow near 0: contacts near the elbow and on the inner link cannot be distinguished",
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
-    Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "perhaps the force acts along a tube: one along this link, or along the link before it, gives the "
-    "same torques as the estimated one across this link",
-    Reason.PAYLOAD: "a picked-up payload may also explain the torques; its probability is what the links lack to 1",
+    Reason.MORE: "no single contact explains the torques",
+    Reason.ALONG: "a force along this link, or along the link before it, would cause the same torques",
+    Reason.PAYLOAD: "a payload that was picked up may also explain the torques; the probabilities of the links and of "
+    "the payload add up to 1",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "the arm is braked",
 }
 
 PINNED: Final = (
-    "give the contact position (contact_position in a scenario, the torque of a force command, or contact_source "
-    "pinned)"
+    "give the contact position (contact_position in a scenario, the torque in force_command, or contact_source=pinned)"
 )
 RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly"
-EXCESS: Final = "{quantity} {value:b} {unit} is above its limit {allowed:g}{where}"
+EXCESS: Final = "{quantity} is {value:b} {unit}, above its limit of {allowed:g} {unit}{where}"
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": (
-        "the measured torques",
+        "the uncertain torques",
         "use joint sensors, or the dither if it is off (timing.dither_cycle=40)",
     ),
-    "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
-    "place": ("the contact position", PINNED),
+    "friction": (
+        "the unknown friction of the surface",
+        "lower sensing.friction if the surface has less friction, or bend the arm",
+    ),
+    "place": ("the uncertain contact position", PINNED),
     "resting": (
         "a load that is not in the model",
         "end the command and tare in free space ('wam call tare'), or declare the load (arm.payload)",
     ),
     "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
     "slow_arm": (
-        "the slow approach to this force",
+        "the arm, which would reach this force too slowly",
         "raise limits.settling_time, or lower guard.contact_stiffness if all surfaces are softer",
     ),
     "shaking_arm": (
@@ -64,8 +66,8 @@ UNCERTAIN: Final = (
     "{desired:.3g} {unit} at {where} may be wrong by {error:b} {unit}, mostly because of {part_text}; allowed: "
     "{allowed:b} {unit} (limits.tolerance)"
 )
-HELPED: Final = "; {help}; the arm holds its position"
-KEEPS_PRESSING: Final = "; {part_help}; meanwhile the arm presses on"
+HELPED: Final = "; the arm holds its position; {help}"
+KEEPS_PRESSING: Final = "; the arm keeps pressing; {part_help}"
 UNBOUNDED: Final = {  # by cause, in place of the next table where the error is infinite
     "error": UNKNOWN + HELPED,
     "uncertain": UNKNOWN + KEEPS_PRESSING,
@@ -75,26 +77,24 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
     "pendant",
     "missing": "motor controller {node} does not answer; check its cable",
     "unknown_node": "node {node} does not belong to this arm; take the configuration of your arm",
-    "not_motor": "node {node} has the role {detail}, which is not the role of a motor controller; disconnect what "
-    "has its number",
+    "not_motor": "node {node} is no motor controller: its role is {detail}; disconnect it",
     "firmware": "the firmware of node {node} has no property {detail}",
-    "mixed_firmware": "motor controller {node} has another firmware than controller 1: the number of {detail} differs",
+    "mixed_firmware": "motor controllers {node} and 1 have different firmware: the number of {detail} differs",
     "not_awake": "motor controller {node} does not wake up; its status is {detail}; switch the arm off and on",
-    "wrist": "motor 7 has {detail} poles, allowed 6, those of a wrist; a gimbal has other transmission ratios, and "
-    "this driver does not know it",
-    "counts": "motor controller {node} has {detail} counts per turn, allowed 4096 and 40960",
+    "wrist": "motor 7 has {detail} poles; allowed: 6, those of a wrist; this driver does not know the transmission "
+    "ratios of a gimbal",
+    "counts": "motor controller {node} has {detail} counts per turn; allowed: 4096 or 40960",
     "gain": "motor controller {node} has {detail} counts per N m, far from the maker's value; correct its property "
     "IPNM",
-    "limit": "motor controller {node} has the largest torque (MT) {detail}; it must be above 0",
+    "limit": "the largest torque (property MT) of motor controller {node} is {detail}; it must be above 0",
     "index": "motor controller {node} would take the torque of another motor: its index or group is {detail}",
-    "not_zeroed": "motor controller {node} did not take its zero: it is at {detail} counts, not at those of the home "
-    "pose",
+    "not_zeroed": "motor controller {node} did not accept the position of the home pose: it reports {detail} counts",
     "no_reply": "motor controller {node} sends no position; check its cable",
     "jump": "the position of motor {node} jumps; check its encoder, then start in the home pose again",
     "reset": "motor controller {node} was reset; its zero is lost; check its power, then start in the home pose again",
     "all_silent": "the safety module answers, but no motor controller does; check the cable of the bus",
     "no_power": "nothing answers on the bus; check power, cable and adapter",
-    "estop": "E-stop; release it and press Shift-Idle{lamps}",
+    "estop": "E-stop{lamps}; release it and press Shift-Idle",
     "safety_idle": "the safety module went to idle{lamps}; press Shift-Activate when the arm may move",
     "safety_silent": "the safety module does not answer; check the cable to the pendant",
     "controller_idle": "motor controller {node} left the torque mode: {detail}",
@@ -105,14 +105,13 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
 SENTENCES: Final = {  # by cause
     # the arm holds
     "error": UNCERTAIN + HELPED,
-    "moved_fast": "the arm moved faster than {speed:g} rad/s when the command began, so its load is not known; the "
-    "arm holds its position, and the force is applied once it is at rest",
+    "moved_fast": "when the command came, the arm moved faster than {speed:g} rad/s, so the load on it is not known; "
+    "the arm holds its position, and presses once it is at rest",
     "task": "{reason}; the arm holds its position",
     "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "
-    "arm; until then the arm goes back to where it was free",
+    "arm; until then the arm moves back to where it touched nothing",
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
-    "(limits.free_travel); end the command, bring the arm to the surface, then begin again; the arm holds its "
-    "position",
+    "(limits.free_travel); the arm holds its position; end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:.3g} {unit} have been measured for "
@@ -124,24 +123,24 @@ SENTENCES: Final = {  # by cause
     "allowed error: {allowed:.2g} {unit}; perhaps something is in the way, a joint is at its end, or the arm cannot "
     "move in this direction here",
     "speed": RAISE,
-    "torques_differ": "the torques are not those of a force at {position:.3g} m of {cover} (chi^2 {chi2:.3g}, allowed: "
+    "torques_differ": "the torques do not fit a force at {position:.3g} m along {cover} (chi^2 {chi2:.3g}, allowed: "
     "{allowed:g}); perhaps it acts elsewhere, a second force acts, or friction of motors at rest hides a part of it; "
     "correct the contact position, use the dither, or free the arm",
     "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}); "
     "perhaps a second force acts, or the friction of the surface has changed its direction; command the force again",
     "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N ({limit}); the arm "
     "moves away, by at most limits.free_travel",
-    "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there; "
-    "command another posture or direction",
-    "oscillating": "the measured force oscillates by {swing:b} N about {desired:.3g} N, with a period of {period:b} s; "
-    "allowed: {allowed:g} times the commanded force (limits.cycle_force); {calm}",
+    "joint_end": "{joint} stops at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad; command another "
+    "posture or direction",
+    "oscillating": "the measured force oscillates by {swing:b} N peak to peak, with a period of {period:b} s; "
+    "allowed: {allowed:g} times the commanded {desired:.3g} N (limits.cycle_force); {calm}",
     "model_off": "the {part} differs from the configured one; /diagnostics has the difference; if it lasts, {model}",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
-    "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
-    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {cure}",
-    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {step}: make its "
-    "steps faster, or run it in its own process",
+    "command_stale": "command stale: {age_ms:.0f} ms old; allowed: {allowed_ms:.0f} ms; {cure}",
+    "driver_late": "the driver itself did not run for {time:.2f} s; allowed: {allowed:g} s; {cure}",
+    "held_up": "the driver itself did not run for {time:.2f} s; allowed: {allowed:g} s; {step}: make the steps of "
+    "that node faster, or run it in its own process",
     "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is back where it was before this step; "
     "{less}, or lower timing.period",
@@ -151,13 +150,13 @@ SENTENCES: Final = {  # by cause
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one",
     "stopped": "{nodes} has stopped or is very slow: no new {topics}; start it again, or 'wam up' if that started it; "
-    "or end other programs if the computer is busy",
-    "long_step": "{step}: no new {topics}; make its steps faster",
+    "if the computer is busy, end other programs",
+    "long_step": "no new {topics}, because {step}; make the steps of that node faster",
     "ended": "{node} has ended; start it again, or 'wam up' if that started it",
     **{f"bus_{cause}": f"bus: {text}" for cause, text in BUS.items()},
 }
 LESS: Final = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
-SINCE: Final = ("without a contact", "since the force was last right or rising")
+SINCE: Final = ("without a contact", "since the force was last within its tolerance")
 REACH: Final = (
     "nothing is touched; bring the arm to the surface first, command more force, or bend the arm",
     "command a force that the arm can reach, or bend the arm",
@@ -215,14 +214,14 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
         "reach": REACH[2 if is_pulled else has_touched],
         "calm": CALM[is_motors],
         "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,
-        "lamps": f": its pendant shows a fault of the {values['detail']}" if values.get("detail") else "",
+        "lamps": f" (the pendant shows a fault of the {values['detail']})" if values.get("detail") else "",
         "model": "declare it (arm.payload)" if values.get("part") == "payload" else "run 'wam identify'",
     }
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         helps = INSTEAD.get((values["part"], values["source"]), helps)
         is_joint = math.isnan(values["position"])
-        where = values["cover"] if is_joint else f"{values['position']:.3g} m of {values['cover']}"
+        where = values["cover"] if is_joint else f"{values['position']:.3g} m along {values['cover']}"
         found |= {"part_text": part, "part_help": helps, "where": where, "help": _help(values, helps)}
     return found
 
@@ -237,5 +236,5 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
     if "pin" in values and helps is not PINNED:
         found.append(PINNED)
     if "searched" in values and not found:
-        return f"no force up to 5 times as large and no turn of a single joint helps; {helps}"
+        return f"neither a force up to 5 times as large nor the turn of a single joint helps; {helps}"
     return ", or ".join([*found, helps])

@@ -22,7 +22,8 @@ class WatchedLimit(NamedTuple):
     @property
     def warning(self) -> str:
         """The warning, in words."""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}{self.where}"
+        near = f"near its limit of {self.limit:g} {self.unit}{self.where}"
+        return f"{self.quantity} is {self.value:.2f} {self.unit}, {near}"
 
     @property
     def is_exceeded(self) -> bool:

@@ -193,7 +193,7 @@ def test_too_fast_is_a_fault_and_nearly_too_fast_a_warning(
     spin = (direction * SPIN[0], 0.0, 0.0, 0.0)
     warnings = until_fault(hardware, spin)
     assert hardware.safety.fault.startswith(fault)
-    assert f"above its limit {limit:g}" in hardware.safety.fault
+    assert f"above its limit of {limit:g}" in hardware.safety.fault
     assert len(warnings) == 1
     assert abs(hardware.recent[-1].thetad[0]) > 0.0, "the last sample shows the speed"
     assert warnings[0].startswith(fault)
@@ -333,12 +333,12 @@ def test_cable_near_its_breaking_strength_is_a_warning_and_above_a_fault_that_na
     strength[i] = tight_tensions()[i] / share
     hardware = hardware_with_cables(breaking_strength=tuple(strength))
     play(hardware, 0.03)
-    what = f"cable tension of motor{i + 1} {tight_tensions()[i]:.0f}"
+    what = f"cable tension of motor{i + 1} is {tight_tensions()[i]:.0f}"
     assert [warning for warning in hardware.warnings if warning.startswith(what[:-2])] == hardware.warnings
     assert (hardware.safety.mode is Mode.FAULT) is faults
     if faults:
         assert what[:-2] in hardware.safety.fault
-        assert f"is above its limit {strength[i]:g}" in hardware.safety.fault
+        assert f"above its limit of {strength[i]:g} N" in hardware.safety.fault
         assert hardware.currents == [0.0] * 4
     else:
         assert bool(hardware.warnings) is warns
@@ -521,7 +521,7 @@ def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
     hardware = stopped_at_speed([0.0, -0.6, 0.0, 0.5], [0.0, 3.5, 0.0, 0.0], stop, brake_torque=1000.0)
     fault = hardware.safety.fault
     assert fault.startswith(before + "cable tension of motor2 ")
-    assert fault.endswith(" N is above its limit 756.198 while the brakes hold; check the cable")
+    assert fault.endswith(" N, above its limit of 756.198 N while the brakes hold; check the cable")
     hardware.reset_fault()
     for _ in range(20):
         hardware.advance(0.0)
