@@ -28,7 +28,7 @@ class Equation(NamedTuple):
 
 EQUATIONS: tuple[Equation, ...] = (
     Equation("2.1", "2.1.1", "contact force from two joint torques", "cos theta_2 is missing; straight arm only"),
-    Equation("2.2", "2.1.1", "position of the contact", "cos theta_2 is missing; straight arm only"),
+    Equation("2.2", "2.1.1", "contact position", "cos theta_2 is missing; straight arm only"),
     Equation("3.1", "3.2.2", "greatest force of an impact", "J is the effective mass at the contact"),
     Equation("3.2", "3.2.4", "useful length of a link in a grasp", "tan(theta/2) = mu, not tan(theta) = mu"),
     Equation("3.3", "3.2.4", "largest cylinder that two links hold", "tan(theta/2) = mu, not tan(theta) = mu"),
@@ -51,9 +51,9 @@ EQUATIONS: tuple[Equation, ...] = (
     Equation("4.5", "4.3.1", "limit of the lower resonance for a soft contact"),
     Equation("4.6", "4.3.1", "limit of the lower resonance for a hard contact"),
     Equation(
-        "4.7", "4.3.1", "limits of both resonances for a small ratio", "the printed values are squares of omega_1"
+        "4.7", "4.3.1", "limits of both resonances for a small reducer ratio N", "the printed values are squares of omega_1"
     ),
-    Equation("4.8", "4.3.1", "limit of the lower resonance for a large ratio"),
+    Equation("4.8", "4.3.1", "limit of the lower resonance for a large N"),
     Equation("4.9", "4.3.2", "best contact stiffness", "gives 8.27e5 lb-in/rad, 638 lb/in, not 9e5 and 650"),
     Equation("4.10", "4.4", "best transmission stiffness", "J_t is J_l; the asymptote above it is sqrt(k_tr/J_m)"),
     Equation("5.1", "5.3", "steady error of proportional control"),

@@ -88,9 +88,9 @@ class Backdriving:
 
 PAYLOADS = {"none": 0.0, "2 kg": CASE.payload}
 QUANTITIES = (
-    ("least over greatest effective mass [-]", "{:.2g}"),
-    ("rotors' share of the effective mass [-]", "{:.2g}"),
-    ("push that moves no joint [N]", "{:.3g}"),
+    ("smallest effective mass divided by largest [-]", "{:.2g}"),
+    ("fraction of the effective mass due to the rotors [-]", "{:.2g}"),
+    ("largest push that moves no joint [N]", "{:.3g}"),
 )
 
 
@@ -105,7 +105,7 @@ def backdrivability() -> Panels:
         Panel(
             f"{'abc'[i]})",
             quantity,
-            "part of the poses [-]",
+            "fraction of the poses [-]",
             tuple((f"payload {name}", line_only(np.sort(values[:, i]), part)) for name, values in found.items()),
         )
         for i, (quantity, _) in enumerate(QUANTITIES)

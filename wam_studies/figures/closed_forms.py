@@ -176,7 +176,7 @@ def _stiffness() -> Panel:
         line = unit * stiffness_with_reducer(cables.stage_ea[0], length, ratio, shares * length)
         measured = np.array([static_stiffness(line_of(ratio, share)) for share in some])
         lines.append((f"N = {ratio:g}", Series(shares, line, some, measured)))
-    return Panel("a) reducer part of the way (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", lines, "y")
+    return Panel("a) reducer between the ends (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", lines, "y")
 
 
 def _bandwidth() -> Panel:

@@ -126,13 +126,13 @@ def open_loop() -> Panels:
         lines = []
         for share in CASE.force_shares:
             bounds, errors = (_sorted(of, pushes, share) for of in (arm.bound, arm.error))
-            lines.append((f"{100 * share:g} % of that force", line_only(errors, _parts())))
+            lines.append((f"{100 * share:g} % of the steady force", line_only(errors, _parts())))
             lines.append((f"{WORST}{100 * share:g} %", line_only(bounds, _parts())))
         panels.append(_panel(title, lines))
     known = _sorted(OpenLoopArm(False, CASE.fed_forward).error, pushes, CASE.force_shares[-1])
-    plain = panels[-1].line(f"{100 * CASE.force_shares[-1]:g} % of that force")
+    plain = panels[-1].line(f"{100 * CASE.force_shares[-1]:g} % of the steady force")
     both = [("0 % fed forward", plain), ("90 % fed forward", line_only(known, _parts()))]
-    return (*panels, _panel("c) feed-forward, 10 % of that force", both))
+    return (*panels, _panel("c) feed-forward, 10 % of the steady force", both))
 
 
 def _parts() -> Numbers:
@@ -147,7 +147,7 @@ def _sorted(of: Callable[[tuple[float, ...], Numbers], float], pushes: Pushes, s
 
 
 def _panel(title: str, lines: list[tuple[str, Series]]) -> Panel:
-    return Panel(title, "error over the largest steady force [%]", "part of the poses [-]", lines)
+    return Panel(title, "error divided by the steady force [%]", "fraction of the poses [-]", lines)
 
 
 def table(panels: Panels) -> str:
@@ -158,4 +158,4 @@ def table(panels: Panels) -> str:
         for label, series in panel.lines
         if not label.startswith(WORST)
     ]
-    return markdown(("", "", "median error", "largest error"), rows)
+    return markdown(("arm", "case", "median error", "largest error"), rows)

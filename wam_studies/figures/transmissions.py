@@ -100,7 +100,7 @@ def driven(kind: str) -> Driven:
 Measures = dict[str, float]  # by name and unit
 STIFFNESS, PLAY, BANDWIDTH = "stiffness [N m/rad]", "play [rad]", "force bandwidth on 10 lb/in [Hz]"
 EFFICIENCY, INERTIA = "efficiency at peak torque [-]", "backdriven inertia [kg m²]"
-BREAKAWAY, HEAVIER = "torque that backdrives it [N m]", "mass and heat of the motor, over those with cables [-]"
+BREAKAWAY, HEAVIER = "torque that backdrives it [N m]", "mass and heat of the motor, divided by those with cables [-]"
 
 
 def predicted(kind: str) -> Measures:
