@@ -151,7 +151,7 @@ def short(value: Any) -> str:
 
 def parameters(configuration: Configuration) -> str:
     """Every parameter of every node."""
-    head = ["parameter", "in `wam`", "allowed", "meaning"]
+    head = ["parameter", "value in `wam`", "allowed", "meaning"]
     shared = list(parameter_rows(Shared, configuration.sections["/**"]))
     parts = ["## Shared by all nodes, section `/**`\n", markdown(head, shared)]
     for node in NODES:

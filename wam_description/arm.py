@@ -232,22 +232,26 @@ class Timing:
     )
     period: float = parameter("period of the inner loop and of motor_states", "s", low=1e-4, high=0.1)
     substeps: int = parameter("steps of the plant in one period", low=1, high=1000)
-    outer_divisor: int = parameter("inner periods in one outer period, that of the joint side", low=1, high=1000)
-    outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", high=1)
+    outer_divisor: int = parameter(
+        "inner periods in one outer period; the nodes of the joint side run once in an outer period", low=1, high=1000
+    )
+    outer_delay: int = parameter(
+        "in lockstep: delay after which a command of the outer loop is used, in inner periods", high=1
+    )
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
-        "niceness in realtime of all nodes but the recorder, if the system does not grant "
+        "in realtime: niceness of all nodes but the recorder, if the system does not grant "
         "timing.fifo_priority; 0: as other programs",
         low=-20,
         high=0,
     )
     timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
     real_time_factor: float = parameter(
-        "largest pace of lockstep, simulated time over wall clock; at least 0.001, or 0: as fast as possible",
+        "in lockstep: largest simulated time per time of the computer; at least 0.001, or 0: as fast as possible",
         high=100.0,
     )
     dither_cycle: int = parameter(
-        "inner periods in one cycle of the dither, which shows contact at rest; 0: no dither",
+        "inner periods in one cycle of the dither, with which motors detect contact at rest; 0: no dither",
         high=1000,
     )
     fifo_priority: int = parameter(
@@ -310,14 +314,17 @@ class InputAges:
     """Ages from which an input counts as absent; also how far its stamp may be ahead of the newest state."""
 
     feedback: float = parameter(
-        "age from which a message of another node counts as absent; the driver brakes if the arm needs it",
+        "age from which a message of another node counts as absent; if the arm needs the message, the driver brakes",
         "s",
         low=0.002,
         high=1.0,
     )
     command: float = parameter(
-        "age from which a program's command counts as absent: force, posture, joint torque", "s", low=0.002, high=1.0,
-    )  # fmt: skip
+        "age from which a command of a program counts as absent: force, posture, joint torque",
+        "s",
+        low=0.002,
+        high=1.0,
+    )
 
     def limit_ns(self, kind: str) -> int:
         """The limit of this name, such as 'command', in ns."""

@@ -18,7 +18,7 @@ class Ripples:
     """
 
     shafts: tuple[str, ...] = parameter("motor or joint that turns the pulley of each ripple, directly or by a gear")
-    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft", low=-1000.0, high=1e3)
+    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of the shaft", low=-1000.0, high=1e3)
     amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", high=100.0)
     cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1, high=1e4)
     phase: tuple[float, ...] = parameter("phase at angle zero", "rad", low=-6.3, high=6.3)
@@ -32,7 +32,9 @@ class Effects:
     """Which effects the plant has, and their size."""
 
     ripples: Ripples
-    creep: bool = parameter("true if cables creep on their pulleys (6.19); the creep is also their loss (6.15)")
+    creep: bool = parameter(
+        "true if cables creep on their pulleys (6.19); the creep also causes the power loss of (6.15)"
+    )
     backlash: tuple[float, ...] = parameter(
         "play of each circuit at its motor, one value for all or one each; with play the circuit is a gear or shaft "
         "without pretension (2.2)",
@@ -40,7 +42,7 @@ class Effects:
         high=10.0,
         is_common=True,
     )
-    slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
+    slack: bool = parameter("true if a strand can become slack; false: as with infinite pretension")
     pretension_share: tuple[float, ...] = parameter(
         "active pretension (6.5) as a fraction of arm.cables.pretension, one value for all or one each; a new value "
         "acts at once",
@@ -54,14 +56,14 @@ class Effects:
         high=1.0,
     )
     included_in_friction: bool = parameter(
-        "true: the friction in arm.motors was measured, so it includes friction by tension and ripples (7.2.2), and "
-        "the plant's dry friction is the rest; false: both are added to it",
+        "true: the friction in arm.motors is measured and includes friction by tension and ripples (7.2.2); the "
+        "plant's dry friction is the rest. false: friction by tension and ripples are added",
     )
     added_coulomb_friction: tuple[float, ...] = parameter(
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0, live=True
     )
     terminated: bool = parameter(
-        "true if the cables end on both pulleys, which bounds their creep (6.4.3), as docs/plant.md states",
+        "true if the cables end on both pulleys, which limits their creep (6.4.3); see docs/plant.md",
         default=False,
     )
     capstan: float = parameter(

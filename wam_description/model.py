@@ -37,7 +37,7 @@ class MotorModel:
     )
     coulomb_negative: tuple[float, ...] = like(Motors, "arm.motors.dynamic_friction", "the same in negative motion")
     static_positive: tuple[float, ...] = like(
-        Motors, "arm.motors.static_friction", "friction F_s towards zero speed, in positive motion"
+        Motors, "arm.motors.static_friction", "friction F_s at very low speed, in positive motion"
     )
     static_negative: tuple[float, ...] = like(Motors, "arm.motors.static_friction", "the same in negative motion")
     viscous: tuple[float, ...] = like(Motors, "arm.motors.viscous_friction", "viscous friction b")
@@ -57,9 +57,10 @@ class JointModel:
     coulomb: tuple[float, ...] = like(
         Joints,
         "arm.joints.dynamic_friction",
-        "dynamic friction F_d; once identified, 0 at a joint with its own motor, whose friction includes it",
+        "dynamic friction F_d; after the identification 0 at a joint with its own motor, because the motor's friction "
+        "includes it",
     )
-    static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
+    static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s at very low speed")
     viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")
     stribeck_velocity: tuple[float, ...] = parameter("Stribeck velocity v_s", "rad/s", low=1e-6, high=1e3)
     load: tuple[float, ...] = parameter("friction k per transmitted torque", high=0.9)

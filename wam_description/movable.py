@@ -43,7 +43,7 @@ class FreeBodies(Countable):
     mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", high=1e3)
     friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
     ground_friction: tuple[float, ...] = parameter(
-        "coefficient of friction against obstacles, doors and other bodies; of two bodies the larger one counts",
+        "coefficient of friction against obstacles, doors and other bodies; the larger value of two bodies is used",
         high=10.0,
     )
     ground_stiffness: tuple[float, ...] = parameter(

@@ -58,7 +58,9 @@ class Springs(Countable):
     stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m")
     lever: tuple[float, ...] = parameter("distance of the spring from the axis of the joint", "m", low=1e-3, high=3.0)
     rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", low=-13.0, high=13.0)
-    bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
+    bilateral: tuple[bool, ...] = parameter(
+        "true if the spring also pulls; false: it only pushes towards larger angles"
+    )
 
     def __post_init__(self) -> None:
         aligned("world.springs", self.joints, self)
@@ -126,7 +128,7 @@ class Folding:
     damping: float = parameter("damping", "N s/m", high=1e6)
     friction: float = parameter("friction coefficient", high=10.0)
     clearance: float = parameter(
-        "length of the outer tube, from the joint, that has no contact: near the joint the tubes overlap",
+        "length of the outer tube, from the joint, that never makes contact, because the tubes overlap near the joint",
         "m",
         high=10.0,
     )

@@ -45,17 +45,17 @@ class DriverParameters:
         high=1.0,
     )
     brake_torque: float = parameter(
-        "torque at which the brake of a rotor slips, so that braking breaks no cable",
+        "torque at which the brake of a rotor slips; it prevents that braking breaks a cable",
         "N m",
         low=0.1,
         high=1e3,
     )
     cover_speed_limit: float = parameter(
-        "speed of a cover at its end nearer the base, above which there is a fault",
+        "speed of the end of a cover nearer the base, above which the driver faults",
         "m/s",
         high=100.0,
     )
-    tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", high=100.0)
+    tip_speed_limit: float = parameter("speed of the tool above which the driver faults", "m/s", high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 

@@ -14,7 +14,7 @@ class AmplifierParameters:
     torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", high=1.0)
     ripple_cycles: tuple[int, ...] = parameter("cycles of the torque ripple per turn of the motor", low=1, high=1e4)
     current_noise: tuple[float, ...] = parameter(
-        "standard deviation of the noise of the actual current, while it is not zero", "A", high=100.0
+        "standard deviation of the noise of the actual current; no noise while the current is zero", "A", high=100.0
     )
     torque_offset: tuple[float, ...] = parameter(
         "torque of each motor at a reported current of zero, due to the offset of its current sensor",

@@ -51,7 +51,7 @@ EQUATIONS: tuple[Equation, ...] = (
     Equation("4.5", "4.3.1", "limit of the lower resonance for a soft contact"),
     Equation("4.6", "4.3.1", "limit of the lower resonance for a hard contact"),
     Equation(
-        "4.7", "4.3.1", "limits of both resonances for a small reducer ratio N", "the printed values are squares of omega_1"
+        "4.7", "4.3.1", "limits of both resonances for a small ratio N", "the printed values are squares of omega_1"
     ),
     Equation("4.8", "4.3.1", "limit of the lower resonance for a large N"),
     Equation("4.9", "4.3.2", "best contact stiffness", "gives 8.27e5 lb-in/rad, 638 lb/in, not 9e5 and 650"),

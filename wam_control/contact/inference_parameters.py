@@ -14,10 +14,13 @@ class InferenceParameters:
     )
     force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
-        "sd of the distance between the line of the force and the tube's axis, as a fraction of its radius", high=2.0
+        "sd of the distance between the line of the force and the axis of the tube, as a fraction of the tube's radius",
+        high=2.0,
     )
     friction: float = parameter("sd of the friction force along a cover, as a fraction of the force", high=2.0)
-    end_weight: float = parameter("relative frequency of contacts where two links meet, for each of the two", high=1e3)
+    end_weight: float = parameter(
+        "relative frequency of contacts at the ends of two links where they meet, for each of the two links", high=1e3
+    )
     along_weight: float = parameter(
         "relative frequency of forces along the last link: on its surface, and on its end",
         high=1e3,
@@ -27,7 +30,7 @@ class InferenceParameters:
         high=1e3,
     )
     fusion_time: float = parameter(
-        "time over which the torques of a contact are combined; 0: the present moment alone",
+        "time over which the torques of a contact are combined; 0: only the present sample is used",
         "s",
         high=10.0,
     )

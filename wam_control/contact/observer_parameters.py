@@ -19,16 +19,20 @@ class ObserverParameters:
         "factor on mass and inertia of each link in the estimator's model", low=0.1, high=10.0
     )
     friction_scale: float = parameter("factor on the friction in the estimator's model", high=10.0)
-    mass_uncertainty: float = parameter("sd of the model torques of gravity and of inertia, as a fraction", high=1.0)
+    mass_uncertainty: float = parameter(
+        "sd of the error of the modelled torques of gravity and of inertia, as a fraction of them", high=1.0
+    )
     centre_uncertainty: float = parameter("sd of each coordinate of the centre of mass of each link", "m", high=1.0)
     moving_uncertainty: float = parameter(
-        "sd of the friction of a moving shaft at the start, before it is tracked, as a fraction", high=10.0
+        "sd of the error of the friction of a moving shaft before it is tracked, as a fraction of the friction",
+        high=10.0,
     )
     asymmetry_uncertainty: float = parameter(
-        "sd of the difference of each direction from the common friction, as a fraction", high=10.0
+        "sd of the difference between the friction in one direction and the mean, as a fraction of the friction",
+        high=10.0,
     )
     load_uncertainty: float = parameter(
-        "sd of the friction of a motor, and of a joint that several drive, per transmitted torque",
+        "sd of the friction per transmitted torque, of a motor and of a joint that several motors drive",
         high=1.0,
     )
     torque_scale_uncertainty: float = parameter("sd of a motor's torque constant, as a fraction", high=1.0)
@@ -49,12 +53,15 @@ class ObserverParameters:
     motor_rest_velocity: float = parameter(
         "motor speed from which Coulomb friction has its full size", "rad/s", low=1e-6, high=100.0
     )
-    joint_rest_velocity: float = parameter("the same of a joint", "rad/s", low=1e-6, high=100.0)
+    joint_rest_velocity: float = parameter("the same for a joint", "rad/s", low=1e-6, high=100.0)
     friction_memory: float = parameter(
-        "time constant with which the friction of a shaft that came to rest becomes unknown", "s", low=1e-4, high=1.0
+        "time constant with which the friction of a shaft becomes unknown after the shaft stops",
+        "s",
+        low=1e-4,
+        high=1.0,
     )
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
-    motor_torque_fraction: float = parameter("further sd of the motor torques, as a fraction", high=1.0)
+    motor_torque_fraction: float = parameter("further sd of the motor torques, as a fraction of the torque", high=1.0)
     motor_noise: float = parameter(
         "sd of the torque of a moving motor at the start, as a fraction of dynamic friction; afterwards it is tracked",
         high=10.0,

@@ -33,7 +33,7 @@ class SensingParameters:
 
     torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True)
     torque_fraction: float = parameter(
-        "further sd of each measured joint torque, as a fraction of the torque of the commanded force",
+        "further part of this sd, as a fraction of the joint torque of the commanded force",
         high=1.0,
         live=True,
     )
@@ -49,21 +49,21 @@ class SensingParameters:
         "sd of the tangential force on the link, as a fraction of the commanded force", high=2.0, live=True
     )
     zero_limit: float = parameter(
-        "largest external torque of a joint that counts as zero when a force begins at rest without an "
-        "estimated contact; 0: none",
+        "largest external torque of a joint that the loop takes as zero when a force begins at rest without a "
+        "detected contact; 0: none",
         "N m",
         high=1e3,
         live=True,
     )
     least_apparent_mass: float = parameter(
-        "least apparent mass of the arm in the measured force; 0: no bound, which gives a smaller stable "
-        "gain and a smaller error of oblique forces",
+        "smallest apparent mass of the arm with which forces are measured; 0: no bound. Without a bound, the largest "
+        "stable gain and the error of oblique forces are smaller",
         "kg",
         high=100.0,
         live=True,
     )
     apparent_mass_limit: float = parameter(
-        "largest apparent mass; along directions with a larger one the motion is slower; 0: no limit",
+        "largest apparent mass; along directions with a larger apparent mass the motion is slower; 0: no limit",
         "kg",
         high=1e6,
         live=True,

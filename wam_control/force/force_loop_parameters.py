@@ -30,14 +30,11 @@ class LimitParameters:
         high=1e4,
         live=True,
     )
-    joint_margin: float = parameter(
-        "distance from the end of a joint at which it has to stop", "rad", high=1.0, live=True
-    )
-    contact_force: float = parameter(
-        "largest force on the arm, as the joints measure it; above it the arm moves away", "N", live=True
-    )
+    joint_margin: float = parameter("distance from its limit at which a joint has to stop", "rad", high=1.0, live=True)
+    contact_force: float = parameter("largest measured force on the arm; above it the arm moves away", "N", live=True)
     whole_force: float = parameter(
-        "largest whole force at the contact, as a multiple of the commanded force; above it the arm moves away",
+        "largest magnitude of the force at the contact, in all directions together, as a multiple of the commanded "
+        "force; above it the arm moves away",
         live=True,
     )
     impact: float = parameter(
@@ -50,13 +47,14 @@ class LimitParameters:
         "time after which a force that is still not reached is reported", "s", low=1e-3, live=True
     )
     free_travel: float = parameter(
-        "largest travel along a commanded force that is not reached, or against it under a push; then "
-        "the arm holds its position",
+        "largest travel along a commanded force that is not reached; also largest travel against this force under a "
+        "push. Beyond it, the arm holds its position",
         "m",
         live=True,
     )
     tolerance: float = parameter(
-        "tolerated error of a force, as a fraction of the commanded force; up to it a force counts as reached",
+        "tolerated error of a force, as a fraction of the commanded force; with a smaller error the force counts as "
+        "reached",
         live=True,
     )
     doubt: float = parameter(
@@ -66,25 +64,25 @@ class LimitParameters:
         live=True,
     )
     least_tolerance: float = parameter(
-        "error up to which a force counts as reached, however small the commanded force is", "N", high=1e3, live=True
+        "lower bound of the tolerated error, for small commanded forces", "N", high=1e3, live=True
     )
     cycle_force: float = parameter(
-        "swing of the measured force from which a limit cycle is reported, as a fraction of the commanded force",
+        "smallest limit cycle that is reported: measured force, peak to peak, as a fraction of the commanded force",
         live=True,
     )
     shake_force: float = parameter(
-        "with feedback contact_estimate: largest swing of the force due to the dither, on a surface of "
-        "guard.contact_stiffness, as a fraction of the commanded force; above it the arm holds its position",
+        "with feedback contact_estimate: largest variation of the force due to the dither, peak to peak, on a surface "
+        "of guard.contact_stiffness, as a fraction of the commanded force; above it the arm holds its position",
         live=True,
     )
     surface_speed: float = parameter(
-        "largest speed of the surface along the force; the lag of the force behind it counts as an error",
+        "largest speed of the surface along the force; the force lags behind the motion, which counts as an error",
         "m/s",
         high=10.0,
         live=True,
     )
     slide_speed: float = parameter(
-        "largest speed of the surface across the force; if it slopes, it also moves along the force, which "
+        "largest speed of the surface across the force; a sloping surface then also moves along the force, which "
         "counts as an error",
         "m/s",
         high=10.0,
@@ -101,7 +99,8 @@ class ForceLoopParameters:
     limits: LimitParameters
     task: TaskParameters
     mode: str = parameter(
-        "hybrid: force along its direction, posture in all others; open_loop: J^T F fed forward, no feedback",
+        "hybrid: control of the force in its direction, of the posture in all others; open_loop: J^T F fed forward, no "
+        "feedback",
         choices=("hybrid", "open_loop"),
         live=True,
     )
@@ -115,7 +114,7 @@ class ForceLoopParameters:
         live=True,
     )
     force_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", high=100.0, live=True
+        "G_P of each axis (5.23), or one for all: position per force error", "m/N", high=100.0, live=True
     )
     force_error_limit: tuple[float, ...] = parameter(
         "saturation of F_error of each axis, or one for all; above the deadband", "N", live=True
@@ -154,14 +153,14 @@ class ForceLoopParameters:
     )
     posture_gain: float = parameter("joint velocity per error of the posture", "1/s", high=1e3, live=True)
     joint_speed_limit: float = parameter(
-        "largest joint speed due to the posture and to the force", "rad/s", high=1e3, live=True
+        "largest joint speed that is commanded for posture and force", "rad/s", high=1e3, live=True
     )
     force_filter: float = parameter("time constant of the low pass on the measured force", "s", high=10.0, live=True)
     spring_stiffness: tuple[float, ...] = parameter(
         "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", live=True
     )
     spring_rest: tuple[float, ...] = parameter(
-        "joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0, live=True
+        "joint angle at which this spring is relaxed", "rad", low=-13.0, high=13.0, live=True
     )
     contact_source: str = parameter(
         "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
@@ -178,7 +177,9 @@ class ForceLoopParameters:
         live=True,
     )
     link_probability_limit: float = parameter(
-        "least probability of the estimated link with which its contact position is used", high=1.0, live=True
+        "smallest probability of the estimated link with which the estimated contact position is used",
+        high=1.0,
+        live=True,
     )
 
     @property
