@@ -1,7 +1,7 @@
 """Sections about force: how it was reached and held, stability and limit cycles."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from wam_theory.verdicts import Verdict
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
 WHOSE = "Measured force: that of the force loop. Estimated force: that of the contact estimator."
 NOT_APPLIED, ELSE = "Not applied, the arm held its position", "Reported by the force loop"
+STICTION = (
+    "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
+)
 NO_FORCE = f"No commanded force was constant for {HOLD.shortest:g} s or longer"
 
 
@@ -235,31 +238,26 @@ def _words(seen: Swings) -> str:
     }[seen.verdict]
 
 
-def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
-    name, cycle = one.hold.name, one.cycle
+def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> Iterator[Finding]:
+    name, cycle, seen = one.hold.name, one.cycle, one.swinging
+    size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence)
+    if not sure >= CYCLE.sure:
+        size = time = sure = math.nan
     force, period = (math.nan,) * 2 if predicted is None else (predicted.force_peak_to_peak, predicted.period)
-    note = (
-        "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
-    )
-    seen = cycle.confidence >= CYCLE.sure
-    size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3
-    return [
-        Finding(f"{name}: limit cycle, peak to peak", "N", size, force, note if math.isfinite(force) else ""),
-        Finding(f"{name}: period of the limit cycle", "s", time, period),
-        Finding(f"{name}: confidence of the limit cycle", "", sure),
-        *(found._replace(name=f"{name}: {found.name}") for found in (one.swinging.findings if one.swinging else ())),
-    ]
+    yield Finding(f"{name}: limit cycle, peak to peak", "N", size, force, STICTION * math.isfinite(force))
+    yield Finding(f"{name}: period of the limit cycle", "s", time, period)
+    yield Finding(f"{name}: confidence of the limit cycle", "", sure)
+    if seen is not None and seen.shaft and seen.swings.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
+        yield Finding(f"{name}: swing of {seen.shaft}, peak to peak", "rad", seen.swings.peak_to_peak)
+        yield Finding(f"{name}: period of the swing", "s", seen.swings.period)
 
 
-def _theory_findings(name: str, theory: Theory) -> list[Finding]:
+def _theory_findings(name: str, theory: Theory) -> Iterator[Finding]:
     """Predictions for the loop itself."""
-    found = []
     if theory.guarded is not None:
         guard, surface = theory.guarded.assessment, shown(theory.guarded.surface, "N/m")
-        label = f"{name}: gain margin, up to {GUARD.largest_scale:g}"
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
-        found.append(Finding(label, "", math.nan, guard.scale, note))
+        yield Finding(f"{name}: gain margin, up to {GUARD.largest_scale:g}", "", math.nan, guard.scale, note)
     if theory.predicted is not None and (size := theory.predicted.actuator_peak_to_peak) > 0.0:
         label = f"{name}: actuator cycle at the contact, peak to peak"
-        found.append(Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)"))
-    return found
+        yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")

@@ -71,11 +71,9 @@ def guarded(
 
 def sentence(found: Guarded) -> str:
     """The result as a sentence."""
-    assessment = found.assessment
-    surface = f"contact of {shown(found.surface)} N/m"
-    text = f"Stability guard (sampled loop with its velocity loops, {surface}, {found.posture}): domain"
-    if assessment.scale >= 1.0:
-        return f"{text} {assessment.domain}, linearly stable with up to {shown(assessment.scale)} times these gains."
+    domain, scale = found.assessment.domain, found.assessment.scale
+    stable = "linearly stable with up to" if scale >= 1.0 else "NOT linearly stable with more than"
     return (
-        f"{text} {assessment.domain}, NOT linearly stable with more than {shown(assessment.scale)} times these gains."
+        f"Stability guard (sampled loop with its velocity loops, contact of {shown(found.surface)} N/m, "
+        f"{found.posture}): domain {domain}, {stable} {shown(scale)} times these gains."
     )

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding
 from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
@@ -20,18 +19,6 @@ class Swinging(NamedTuple):
 
     shaft: str
     swings: Swings
-
-    @property
-    def findings(self) -> list[Finding]:
-        """Growth of the swings, and size and period of those of a shaft that cycles, without the name of the hold."""
-        one = self.swings
-        growth = Finding("growth per half cycle", "", one.growth, note=f"{one.verdict}; {one.number} swings")
-        if not self.shaft:
-            return [growth]
-        if one.verdict not in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
-            return []
-        size = Finding(f"swing of {self.shaft}, peak to peak", "rad", one.peak_to_peak)
-        return [size, Finding("period", "s", one.period), growth]
 
 
 def swinging(run: RecordedRun, hold: Hold, time: Numbers, force: Numbers) -> Swinging | None:
