@@ -82,7 +82,6 @@ class CycleThresholds:
     edge: float = 1.5  # cycles at an end within the recording that are not evaluated: it is not known better
     swings: int = 3  # swings that a verdict needs
     swings_alike: float = 0.05  # of their mean: swings that differ by less are those of one cycle
-    sure_trend: float = 3.0  # standard errors of a trend
     quiet: float = 1.5  # longest of the last swings; after so long without another one the motion has ended
     late_part: float = 0.7  # of a hold, at its end: its range is that of a cycle, without the approach
     least_swing: float = 0.05  # of the range: a smaller change is no swing
@@ -123,8 +122,7 @@ class HoldThresholds:
     steady: float = 0.4  # fraction of a hold, at its end, taken as steady
     band: float = 0.05  # of the step: settled within it
     before: float = 0.1  # s before a step, whose mean is where it begins
-    loud: float = 0.1  # of the force: an error that stays within it has settled
-    least_step: float = 0.1  # of the force; a smaller change is not evaluated as a step
+    loud: float = 0.1  # of the force: an error that stays within it has settled; a smaller change is no step
     fresh: float = 0.2  # s; the force of a more recent contact is that of the impact
     # of a force: where the loop measured less by that of what acted before a command, it had no measurement
     far: float = 0.5
@@ -138,11 +136,11 @@ class HoldThresholds:
 class TouchThresholds:
     """Which contacts are one, which command they belong to, and how well they are estimated."""
 
-    # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
+    # ns; a shorter loss of contact does not end the contact, no shorter part of one is listed, and the force of a push
+    # or a press may last for so long after its command
     bounce: int = 100_000_000
     lasting: float = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
     steady_link: float = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
-    after_command: int = 100_000_000  # ns, for which the force of a push or a press may last after its command
     position_tolerance: float = 0.04  # m
     false_tolerance: float = 10.0  # % of the time without contact, in which one may be estimated
     ending: float = 0.2  # s: one of less may be a contact that has just ended, before a recording did
@@ -197,10 +195,9 @@ class IdentificationThresholds:
     # a motion that contradicts the configured arm
     contradicted: float = 0.25  # rms that stays unexplained, per Coulomb friction: it is not that of a free arm
     least_friction: float = 1e-4  # N m of a motor, for a ratio to it
-    heavier: float = 1.4  # weight per configured weight, that no configured arm is wrong by
+    heavier: float = 1.4  # weight, or torque, per configured one, that no configured arm is wrong by
     least_share: float = 0.05  # of the configured friction, below which none is left
     misfit: float = 0.15  # rms of the recorded torques beyond those of the configured arm, per torque
-    scaled: float = 1.4  # torques per torque of the configured arm, from which their unit is in doubt
     better: float = 0.5  # of that, what a mistake leaves that explains it
     poses: int = 100  # random ones, in which the columns of parameters are compared
     seed: int = 1  # of these poses

@@ -120,7 +120,7 @@ def _planned(run: RecordedRun, traces: Traces) -> Mask:
     if not np.any(acts):
         return acts
     last = np.maximum.accumulate(np.where(acts, traces.stamp, 0))
-    return (last > 0) & (traces.stamp - last <= TOUCH.after_command)
+    return (last > 0) & (traces.stamp - last <= TOUCH.bounce)
 
 
 def _of_task(run: RecordedRun, traces: Traces) -> Mask:

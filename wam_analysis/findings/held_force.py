@@ -142,7 +142,7 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
     if len(time) < SHAFT.fewest_samples:
         return None
     begin = float(measured[0])
-    if abs(hold.commanded - begin) < max(4.0 * noise(measured), HOLD.least_step * hold.commanded):
+    if abs(hold.commanded - begin) < max(4.0 * noise(measured), HOLD.loud * hold.commanded):
         return None
     try:
         return step_response(time, measured, begin, steady, HOLD.band)

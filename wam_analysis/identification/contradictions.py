@@ -121,7 +121,7 @@ def _ratio(model: Numbers, torque: Numbers, used: Mask) -> float:
 
 def _is_mistake(found: Contradiction) -> bool:
     """Whether a factor is one that no torque constant or mass is wrong by."""
-    return found.mistake is Mistake.SWAPPED or not 1.0 / IDENTIFY.scaled < found.size < IDENTIFY.scaled
+    return found.mistake is Mistake.SWAPPED or not 1.0 / IDENTIFY.heavier < found.size < IDENTIFY.heavier
 
 
 def _swapped(motion: MotionSamples, i: int, j: int) -> MotionSamples:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.thresholds import CYCLE
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.arrays import Numbers, Rows
 from wam_theory.verdicts import Verdict
 
@@ -26,10 +26,10 @@ class Swings(NamedTuple):
     """
 
     verdict: Verdict
-    peak_to_peak: float
-    period: float
-    growth: float
-    number: int
+    peak_to_peak: float = math.nan
+    period: float = math.nan
+    growth: float = math.nan
+    number: int = 0
 
 
 def swings(time: Numbers, value: Numbers, least: float, band: float = 0.0) -> Swings:
@@ -50,15 +50,16 @@ def swings(time: Numbers, value: Numbers, least: float, band: float = 0.0) -> Sw
     if not least > 0.0:
         raise ValueError(f"least is {least!r}; it must be above zero, above the noise of the signal")
     if band and np.all(np.abs(value[-max(len(value) // 5, 2) :]) <= band):
-        return Swings(Verdict.SETTLED, math.nan, math.nan, math.nan, 0)
+        return Swings(Verdict.SETTLED)
     rows = turning_points(value, least)
     sizes, lengths = np.abs(np.diff(value[rows])), np.diff(time[rows])
     if len(sizes) < CYCLE.swings:
-        return Swings(Verdict.UNDECIDED, math.nan, math.nan, math.nan, len(sizes))
+        return Swings(Verdict.UNDECIDED, number=len(sizes))
     late = sizes[-max(len(sizes) // 2, CYCLE.swings) :]
-    slope, error = trend(np.log(late))
+    line, covariance = np.polyfit(np.arange(len(late)), np.log(late), 1, cov=True)
+    slope, error = float(line[0]), math.sqrt(covariance[0, 0])
     ended = float(time[-1] - time[rows[-1]]) > CYCLE.quiet * float(np.max(lengths[-CYCLE.swings :]))
-    changes = abs(slope) * (len(late) - 1) > CYCLE.swings_alike and abs(slope) > CYCLE.sure_trend * error
+    changes = abs(slope) * (len(late) - 1) > CYCLE.swings_alike and abs(slope) > SHAFT.sigmas * error
     if ended or (changes and slope < 0.0):
         verdict = Verdict.SETTLED
     elif changes:
@@ -68,15 +69,6 @@ def swings(time: Numbers, value: Numbers, least: float, band: float = 0.0) -> Sw
     else:
         verdict = Verdict.UNDECIDED
     return Swings(verdict, float(np.mean(late)), float(time[rows[-1]] - time[rows[-3]]), math.exp(slope), len(sizes))
-
-
-def trend(values: Numbers) -> tuple[float, float]:
-    """Slope per step of a line through values, (n,), and its standard error."""
-    steps = np.arange(len(values)) - (len(values) - 1) / 2.0
-    square = float(steps @ steps)
-    slope = float(steps @ values) / square
-    rest = values - np.mean(values) - slope * steps
-    return slope, math.sqrt(float(rest @ rest) / max(len(values) - 2, 1) / square)
 
 
 def turning_points(value: Numbers, least: float) -> Rows:
