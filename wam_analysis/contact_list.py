@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import held_rows
+from wam_analysis.held_messages import held_rows, step_at
 from wam_analysis.measures.runs import runs
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import HYPOTHESIS, NAN, ForceSignal, Traces, most_probable
@@ -320,5 +320,4 @@ def estimate(traces: Traces, certainty: Certainty, rows: Index) -> Estimate:
 def time_of(traces: Traces, steps: Sequence[RecordedStep], begin: int, end: int) -> tuple[str, float, float]:
     """The step in which most of some rows is, and both ends, s."""
     first, last = int(traces.stamp[begin]), int(traces.stamp[end - 1])
-    name = next((step.name for step in steps if step.begin <= (first + last) // 2 < step.end), "")
-    return name, (first - traces.zero) / 1e9, (last - traces.zero) / 1e9
+    return step_at(steps, (first + last) // 2), (first - traces.zero) / 1e9, (last - traces.zero) / 1e9

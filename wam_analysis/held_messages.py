@@ -1,6 +1,6 @@
 """Messages at other times: which is held, where a topic has none, and joints in the order of some names."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +12,7 @@ from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import JointColumns
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.recorded_run import RecordedRun
+from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 
 def held_for(stamps: Times) -> int:
@@ -77,6 +77,11 @@ def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, Numbers] | None:
             found = angles[good]
             return columns.stamp_ns[good], found @ TransmissionMap.of(arm).joint_from_motor.T if is_motors else found
     return None
+
+
+def step_at(steps: Sequence[RecordedStep], stamp: int) -> str:
+    """Name of the step of a scenario at an instant, '' outside."""
+    return next((step.name for step in steps if step.begin <= stamp < step.end), "")
 
 
 def row_at(stamps: NDArray[Any], at: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import intervals
+from wam_analysis.held_messages import intervals, step_at
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers, Times
 from wam_control.force.contact_place import pinned_position
@@ -116,8 +116,8 @@ def holds_of(
     ]
     long = [one for one in parts if one.commanded > HOLD.equal_force and one.end - one.begin >= HOLD.shortest * 1e9]
     for hold in sorted(long, key=lambda one: (one.begin, one.axis)):
-        name = next((step.name for step in steps if step.begin <= (hold.begin + hold.end) // 2 < step.end), "")
-        name = (name or f"{hold.commanded:.3g} N") + f", axis {hold.axis + 1}" * (hold.axis >= 0)
+        name = step_at(steps, (hold.begin + hold.end) // 2) or f"{hold.commanded:.3g} N"
+        name += f", axis {hold.axis + 1}" * (hold.axis >= 0)
         name = name if name not in holds else f"{name} ({hold.begin / 1e9:.1f} s)"
         own = within(of_force_loop(reactions), hold.begin, hold.end)
         holds[name] = hold._replace(name=name, reactions=own)

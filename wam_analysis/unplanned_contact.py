@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import held_rows
+from wam_analysis.held_messages import held_rows, step_at
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import NAN, Traces
 from wam_bag.arrays import Mask, Numbers
@@ -46,7 +46,7 @@ class HardContact(NamedTuple):
 
 
 class UnplannedContacts(NamedTuple):
-    """Those that were too hard, one for each step and for the time before and after; and what is not known of others.
+    """Those that were too hard, one for each step and for the time outside; and what is not known of others.
 
     Attributes
     ----------
@@ -71,26 +71,21 @@ def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[Recorde
     """
     is_true, allowed, lacking = traces.true.is_known, _allowed(run, traces), ", ".join(_lacking(run))
     size = np.where(is_true, traces.true.size, traces.estimated.size)
-    is_free = ~_planned(run, traces) & (size > 0.0)
-    unknown = [f"{LIMIT} of the force loop was not recorded, or cannot be read"] * bool(
-        np.any(np.isnan(allowed[is_free]))
-    )
-    names = ["", *(step.name for step in steps), ""]  # before the first and after the last
-    ends = [*(step.begin for step in steps), *(step.end for step in steps[-1:])]
-    number, is_hard = np.searchsorted(ends, traces.stamp, side="right"), is_free & (size > allowed)
-    found = []
-    for part in np.unique(number[is_hard]).tolist():
-        row = int(np.argmax(np.where(is_hard & (number == part), size, 0.0)))
-        seconds = (int(traces.stamp[row]) - traces.zero) / 1e9
+    is_free, hard = ~_planned(run, traces) & (size > 0.0), dict[str, HardContact]()
+    rows = np.flatnonzero(is_free & (size > allowed))
+    for row in rows[np.argsort(-size[rows], kind="stable")].tolist():
+        step, seconds = step_at(steps, traces.stamp[row]), (int(traces.stamp[row]) - traces.zero) / 1e9
         source = "true" if is_true[row] else "estimated"
-        found.append(HardContact(names[part], seconds, float(size[row]), float(allowed[row]), source))
+        hard.setdefault(step, HardContact(step, seconds, float(size[row]), float(allowed[row]), source))
+    found = sorted(hard.values(), key=lambda one: one.seconds)
+    unknown = [f"{LIMIT} of the force loop was not recorded, or cannot be read"] * any(np.isnan(allowed[is_free]))
     if lacking:
         unknown += [
-            f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded ({lacking})"
-            for hard in found
+            f"one had {one.force:.3g} N, and what may have been commanded then was not recorded ({lacking})"
+            for one in found
         ]
         found = []
-    return UnplannedContacts(tuple(found), "; ".join(dict.fromkeys(unknown)))
+    return UnplannedContacts(tuple(found), "; ".join(unknown))
 
 
 def _lacking(run: RecordedRun) -> list[str]:
@@ -116,17 +111,9 @@ def _allowed(run: RecordedRun, traces: Traces) -> Numbers:
 
 def _planned(run: RecordedRun, traces: Traces) -> Mask:
     """Whether a force, a push or a task is commanded, or was until shortly before, (k,)."""
-    acts = traces.commanded.acts | traces.push.acts | _of_task(run, traces)
-    if not np.any(acts):
-        return acts
+    acts = traces.commanded.acts | traces.push.acts
+    if (columns := run.table("task_command")) is not None:
+        row, known = held_rows(columns.stamp_ns, traces.stamp)
+        acts |= known & np.isin(row, columns.message)  # a task with axes
     last = np.maximum.accumulate(np.where(acts, traces.stamp, 0))
     return (last > 0) & (traces.stamp - last <= TOUCH.bounce)
-
-
-def _of_task(run: RecordedRun, traces: Traces) -> Mask:
-    """Whether a task is commanded, (k,): one with axes."""
-    columns = run.table("task_command")
-    if columns is None:
-        return np.zeros(len(traces.stamp), bool)
-    row, known = held_rows(columns.stamp_ns, traces.stamp)
-    return known & np.isin(row, columns.message)
