@@ -14,8 +14,7 @@ swinging               whether a force settles, cycles or diverges
 contact                section about contacts, estimated and true
 prediction             the friction node at the contact and what chapter 5 predicts for it
 guarded                the stability guard on a recorded press
-transmission           friction of motors and joints
-transmission_signals   motors, cables and joints on one time base
+transmission           motors, cables and joints on one time base, and their friction
 motion                 section about friction
 power                  section about efficiency and backdrivability
 timing                 section about the loop, and provenance

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
-from wam_analysis.findings.transmission import TransmissionFriction
-from wam_analysis.findings.transmission_signals import TransmissionSignals
+from wam_analysis.findings.transmission import TransmissionFriction, TransmissionSignals
 from wam_analysis.measures.friction import Friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
-from wam_analysis.findings.transmission_signals import CABLE
+from wam_analysis.findings.transmission import CABLE
 from wam_analysis.measures.friction import UNKNOWN, Friction
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.arrays import Numbers
