@@ -13,6 +13,7 @@ from wam_analysis.findings.repetition import held as held_command
 from wam_analysis.foreign.sources import Source
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, STREAM
+from wam_analysis.traces import ForceSignal
 from wam_bag.arrays import Numbers
 
 FORCES = {**COLOURS, "at least": LIKELY}
@@ -61,10 +62,8 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
 def _over_time(analysis: Analysis) -> Iterator[Chart]:
     """Forces and motions, each with what was commanded."""
     recording = analysis.recording
-    if (traces := _forces_over_time(recording)) is not None:
-        time, forces = traces
-        lines = [ChartLine(name, FORCES[name], value, name == "commanded") for name, value in forces.items()]
-        yield _thinned(Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time"))
+    if (forces := _forces_over_time(recording)) is not None:
+        yield _thinned(forces)
     for one in _shown(recording):
         quantities = [q for q in one.values if not q.startswith("torque")][: 1 if one.is_joint else 3]
         if not quantities:
@@ -85,24 +84,22 @@ def _shown(recording: AnalysedRecording) -> list[Source]:
     return motors if len(motors) == len(states) else [one for one in states if one not in motors]
 
 
-def _forces_over_time(recording: AnalysedRecording) -> tuple[Numbers, dict[str, Numbers]] | None:
-    """Time, (k,), s, and size of each force that was recorded, (k,), N; None if there is none."""
-    traces = recording.traces
-    signals = {"commanded": traces.commanded, "true": traces.true, "measured": traces.measured}
-    signals["estimated"] = traces.estimated
-    found = {
-        name: np.where(signal.is_known, signal.size, np.nan)
-        for name, signal in signals.items()
-        if len(traces.stamp) and np.any(signal.is_known) and np.any(signal.size[signal.is_known] > 0.0)
-    }
-    if not found or list(found) == ["commanded"]:
+def _forces_over_time(recording: AnalysedRecording) -> Chart | None:
+    """The size of each force that was recorded; None if there is none but the commanded one."""
+    traces, found = recording.traces, dict[str, Numbers]()
+    for name in ("commanded", "true", "measured", "estimated"):
+        signal: ForceSignal = getattr(traces, name)
+        if np.any(signal.acts):
+            found[name] = signal.size
+    if not found.keys() - {"commanded"}:
         return None  # nothing to compare the command with
     if np.any(bound := traces.estimated.is_lower_bound):
         found |= {"at least": np.where(bound, found["estimated"], np.nan)}
         found["estimated"] = np.where(bound, np.nan, found["estimated"])
     rising = np.concatenate(([True], np.diff(traces.stamp) > 0))
+    lines = (ChartLine(name, FORCES[name], value[rising], name == "commanded") for name, value in found.items())
     time = (traces.stamp - traces.stamp[0])[rising] / 1e9
-    return time, {name: value[rising] for name, value in found.items()}
+    return Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time")
 
 
 def _positions(analysis: Analysis) -> Iterator[Chart]:
@@ -117,27 +114,16 @@ def _positions(analysis: Analysis) -> Iterator[Chart]:
 
 
 def _thinned(chart: Chart) -> Chart:
-    """The chart with at most `points` points, which looks the same."""
+    """The chart with at most `points` points, which looks the same: minimum and maximum of each interval."""
     if len(chart.x) <= LAYOUT.points:
         return chart
-    lines = [one._replace(values=_envelope(chart.x, one.values, LAYOUT.points)[1]) for one in chart.series]
-    return chart._replace(x=_envelope(chart.x, chart.x, LAYOUT.points)[0], series=tuple(lines))
-
-
-def _envelope(time: Numbers, value: Numbers, most: int) -> tuple[Numbers, Numbers]:
-    """A line with at most so many points that looks the same: minimum and maximum of each interval.
-
-    Parameters
-    ----------
-    time, value : (n,).
-    most : points, an even number.
-    """
-    edges = np.linspace(0, len(time), most // 2 + 1).astype(np.int64)
-    filled = np.where(np.isfinite(value), value, np.nan)
-    low = np.fmin.reduceat(filled, edges[:-1])
-    high = np.fmax.reduceat(filled, edges[:-1])
-    at = time[(edges[:-1] + edges[1:] - 1) // 2]
-    return np.repeat(at, 2), np.column_stack([low, high]).ravel()
+    edges = np.linspace(0, len(chart.x), LAYOUT.points // 2 + 1).astype(np.int64)
+    lines = []
+    for one in chart.series:
+        filled = np.where(np.isfinite(one.values), one.values, np.nan)
+        ends = [extreme.reduceat(filled, edges[:-1]) for extreme in (np.fmin, np.fmax)]
+        lines.append(one._replace(values=np.column_stack(ends).ravel()))
+    return chart._replace(x=np.repeat(chart.x[(edges[:-1] + edges[1:] - 1) // 2], 2), series=tuple(lines))
 
 
 def data(found: list[Chart]) -> str:
