@@ -3,11 +3,9 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.guarded import sentence as guard_sentence
-from wam_analysis.findings.held_force import ForceAccuracy, HeldForce, Theory
+from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
@@ -73,34 +71,29 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     """How far the held forces were from the commanded ones, in a sentence."""
     held = [one for one in held if not one.hold.is_short]
-    known = [(one, accuracy.smallest) for one in held if math.isfinite((accuracy := _accuracy(one)).smallest)]
+    known = [one for one in held if math.isfinite(one.best.smallest)]
+    applied = [one for one in known if one.largest >= FORCE.touch * one.hold.commanded]
     if not known:
         return ()
-    applied = [(one, error) for one, error in known if _has_touched(one)]
-    free = ", ".join(one.hold.name for one, _ in known if not _has_touched(one))
     text = f"Forces: {len(applied)} of {len(held)} applied"
     if applied:
-        worst, error = max(applied, key=lambda item: item[1] / item[0].hold.commanded)
+        worst = max(applied, key=lambda one: one.best.smallest / one.hold.commanded)
         whose = "" if len(worst.true) else "measured "
-        text += f", largest {whose}error {100.0 * error / worst.hold.commanded:.1f} %"
+        text += f", largest {whose}error {100.0 * worst.best.smallest / worst.hold.commanded:.1f} %"
+    touched = [one.hold.name for one in applied]
+    free = ", ".join(one.hold.name for one in known if one.hold.name not in touched)
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
-
-
-def _has_touched(one: HeldForce) -> bool:
-    """Whether there was a force at all: the true one, or the measured one if the true one was not recorded."""
-    force = np.abs(one.true if len(one.true) else one.measured)
-    return float(np.nanmax(force)) >= FORCE.touch * one.hold.commanded
 
 
 def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     """Dynamic range (3.2.1) of the recording, and the largest force that the arm could give there."""
-    known = [(one, accuracy) for one in recording.held if math.isfinite((accuracy := _accuracy(one)).smallest)]
+    known = [one for one in recording.held if math.isfinite(one.best.smallest)]
     if not known:
         return []
     limits = [one.largest for one in recording.theories.values() if one.largest and math.isfinite(one.largest.force)]
     limit = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
-    smallest = max(accuracy.smallest for _, accuracy in known) or math.nan
-    largest = max(one.hold.commanded + accuracy.bias for one, accuracy in known)
+    smallest = max(one.best.smallest for one in known) or math.nan
+    largest = max(one.hold.commanded + one.best.bias for one in known)
     by = f"limited by {limit.limited_by}" if limits else ""
     return [
         Finding("largest error, bias plus ripple", "N", smallest),
@@ -108,11 +101,6 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
         Finding("largest force of motors and cables", "N", math.nan, limit.force, by),
         Finding("dynamic range", "", largest / smallest, note="largest held force over the largest error"),
     ]
-
-
-def _accuracy(one: HeldForce) -> ForceAccuracy:
-    """Of the true force, or of the measured one if the true one was not recorded."""
-    return one.accuracy["true" if len(one.true) else "measured"]
 
 
 def _press_sentence(one: HeldForce) -> str:
@@ -126,7 +114,7 @@ def _press_sentence(one: HeldForce) -> str:
         return f"{text}, but not controlled, so it is not evaluated."
     if hold.is_short:
         return f"{text} for less than {STEADY:g} s, so it has no steady state."
-    if math.isnan(_accuracy(one).bias):
+    if math.isnan(one.best.bias):
         return f"{text}; the resulting force was not recorded."
     remarks = [text]
     if response is not None and math.isfinite(response.rise):
@@ -141,9 +129,8 @@ def _impact(one: HeldForce) -> str:
         return f"it began while {shown(one.before, 'N')} acted already"
     if math.isnan(one.touched):
         return ""
-    peak = float(np.nanmax(one.true if len(one.true) else one.measured))
     when = f"{shown(abs(one.touched), 's')} {'after' if one.touched > 0.0 else 'before'} it began"
-    return f"the surface was touched {when}, and the force peaked at {shown(peak, 'N')}"
+    return f"the surface was touched {when}, and the force peaked at {shown(one.largest, 'N')}"
 
 
 def press_findings(one: HeldForce) -> list[Finding]:

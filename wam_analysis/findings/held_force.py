@@ -81,6 +81,16 @@ class HeldForce(NamedTuple):
     swinging: Swinging | None = None
     is_pushed: bool = False
 
+    @property
+    def best(self) -> ForceAccuracy:
+        """Of the true force, or of the measured one if the true one was not recorded."""
+        return self.accuracy["true" if len(self.true) else "measured"]
+
+    @property
+    def largest(self) -> float:
+        """The most of that force, N."""
+        return float(np.nanmax(self.true if len(self.true) else self.measured))
+
 
 def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
     """Evaluate a hold; of a force that was not controlled its signals are all there is."""
