@@ -9,6 +9,7 @@ from wam_analysis.contact_list import NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, Li
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT, TOUCH
+from wam_bag.arrays import Numbers
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 
 BLIND = "Contacts while the brakes hold are not compared: without joint sensors they are not detected."
@@ -19,12 +20,11 @@ def contact_section(recording: AnalysedRecording) -> Section:
     traces = recording.traces
     estimated = ("contact/wrench", "contact/point", "contact/hypotheses")
     lacking = recording.run.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
-    sentences: list[str] = []
     findings: list[Finding] = []
     wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
     shows: list[str] = []
     named = [f"{number} {one.step}" for number, one in enumerate(recording.contacts, 1) if one.step]
-    sentences += [f"Contacts by number and step: {', '.join(named)}."] if named else []
+    sentences = [f"Contacts by number and step: {', '.join(named)}."] * bool(named)
     for number, contact in enumerate(recording.contacts, 1):
         name = f"{number} {contact.estimate.link}{' false' * contact.is_false}"
         declared = declared_position(recording, contact)
@@ -37,34 +37,24 @@ def contact_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"Positions of contacts: {NOT_PLACED}.")
     sentences += [BLIND] * bool(np.any(recording.blind & traces.true.acts))
     sentences += wrong
-    true, sensed = traces.true, traces.estimated
-    known = traces.is_compared
+    true, sensed, known = traces.true, traces.estimated, traces.is_compared
     touching = known & true.acts
     if np.any(touching):
         both = touching & sensed.acts & (sensed.frame == true.frame)
-        position = np.abs(sensed.position - true.position)[both]
-        position = position[np.isfinite(position)]
         is_estimate = both & sensed.is_placed & ~sensed.is_lower_bound
-        force = np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate]
         right = 100.0 * float(np.mean(both[touching]))
-        away = 100.0 * float(np.median(position)) if len(position) else math.nan
-        off = float(np.median(force)) if len(force) else math.nan
+        away = 100.0 * _middle(np.abs(sensed.position - true.position)[both])
+        off = _middle(np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate])
+        vector = "norm of the error vector; without forces that are lower bounds"
         findings += [
             Finding("correct link, of all contact time", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
-            Finding(
-                "force error (vector), median",
-                "N",
-                off,
-                note="norm of the error vector; without forces that are lower bounds",
-            ),
+            Finding("force error (vector), median", "N", off, note=vector),
         ]
         shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
     if np.any(known):
-        seconds = traces.false_seconds
-        findings.append(
-            Finding("estimated without a contact", "s", seconds, note="false contacts, and the ends of others")
-        )
+        note = "false contacts, and the ends of others"
+        findings.append(Finding("estimated without a contact", "s", traces.false_seconds, note=note))
         if count := sum(one.is_false for one in recording.contacts):
             share = f"False contacts: {count} of {len(recording.contacts)}."
             (wrong if traces.false_percent > TOUCH.false_tolerance else shows).append(share)
@@ -75,6 +65,12 @@ def contact_section(recording: AnalysedRecording) -> Section:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else stated(NOT_ESTIMATED))
     return Section("contact", "Contact", sentences, findings, lacking, shows, wrong)
+
+
+def _middle(values: Numbers) -> float:
+    """Median of those that are known, NaN without any."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else math.nan
 
 
 def declared_position(recording: AnalysedRecording, contact: ListedContact) -> float:
