@@ -167,7 +167,7 @@ def read(
             for channel, batch in parts(file, topics, begin_ns, end_ns):
                 collector = take(channel)
                 try:
-                    collector.add(*batch)
+                    collector.add(batch)
                 except Damage as error:
                     raise Damage(f"topic {channel.topic}: {error}") from None
             listed = file.counts or file.loaded

@@ -126,8 +126,6 @@ def parts(
 ) -> Iterator[tuple[Channel, MessageBatch]]:
     """Messages of each selected topic, some megabytes at a time; at the end the file's own counts are checked.
 
-    Each part is valid until the next one is taken.
-
     Parameters
     ----------
     topics : names as for `is_selected`.
@@ -138,16 +136,16 @@ def parts(
         times = begin, end
         if topics is not None:
             numbers = frozenset(n for n, channel in file.channels.items() if is_selected(channel.topic, topics))
-    for buffer, found in file.batches(numbers, *times):
+    for batch in file.batches(numbers, *times):
         by_topic: dict[str, list[int]] = {}
-        for number in np.flatnonzero(np.bincount(found.channels)).tolist():
+        for number in np.flatnonzero(np.bincount(batch.channels)).tolist():
             if number not in file.channels:
                 raise Damage(f"a message is on channel {number}, which is not defined")
             by_topic.setdefault(file.channels[number].topic, []).append(number)
         for topic, members in by_topic.items():
             if is_selected(topic, topics):
-                is_own = np.logical_or.reduce([found.channels == number for number in members])
-                yield file.channels[members[0]], MessageBatch(buffer, found.of(np.flatnonzero(is_own)))
+                is_own = np.logical_or.reduce([batch.channels == number for number in members])
+                yield file.channels[members[0]], batch.of(np.flatnonzero(is_own))
     if file.counts is None or begin > 0 or end < NEVER:
         return
     for number, channel in file.channels.items():

@@ -14,12 +14,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_bag.arrays import Bytes, Index, Mask, Numbers, Texts, Times
+from wam_bag.arrays import Index, Mask, Numbers, Texts, Times
 from wam_bag.cdr import CDR, MessageType
 from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
 from wam_bag.message_groups import Decoded, Group, Grouping
-from wam_bag.message_search import DATA, Found, messages, packed
+from wam_bag.message_search import DATA, MessageBatch, packed
 from wam_bag.message_text import definitions
 from wam_bag.point_clouds import table_columns, tables
 
@@ -153,18 +153,18 @@ class Collector:
         self._data: list[bytes] = []
         self._number = 0
 
-    def add(self, buffer: Bytes, found: Found) -> None:
-        """Take these messages of a buffer."""
+    def add(self, found: MessageBatch) -> None:
+        """Take these messages."""
         taken = (found.times >= self._begin) & (found.times < self._end)
         if not taken.all():
             found = found.of(taken)
         self._times.append(found.times)
         if self._columned is not None:
             extract, _ = self._columned
-            for group in self._groups_of(buffer, found.offsets + DATA, found.sizes):
+            for group in self._groups_of(found.buffer, found.offsets + DATA, found.sizes):
                 self._groups.append((group.rows + self._number, extract(group)))
         else:
-            self._data += messages(buffer, found)
+            self._data += found.messages()
         self._number += len(found.times)
 
     def columns(self, label: str) -> Columns:
@@ -308,5 +308,5 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
 def columns_of(kind: str, data: Sequence[bytes]) -> Columns:
     """Serialized messages of one installed type, ``package/msg/Type``, as columns; the log times are 0."""
     collector = Collector(MessageType(kind, CDR, definitions(kind, schema(kind))), 0, 1)
-    collector.add(*packed([(0, 0, one) for one in data]))
+    collector.add(packed([(0, 0, one) for one in data]))
     return collector.columns("recorded")

@@ -36,7 +36,7 @@ from wam_bag.mcap_records import (
     parsed,
     walk,
 )
-from wam_bag.message_search import DATA, NEVER, TAIL, Found, MessageBatch, find
+from wam_bag.message_search import DATA, NEVER, TAIL, MessageBatch, find
 
 BATCH: Final = 16 * 2**20  # bytes that are decoded together
 _DATA_END: Final = HEAD.pack(Opcode.DATA_END, 4)  # head of the record that ends the data
@@ -128,8 +128,8 @@ class BagFile:
 
     def _taken(self, batch: MessageBatch) -> MessageBatch:
         """The batch, whose messages are counted."""
-        before, times = self.loaded, batch.found.times
-        messages = dict(enumerate(np.bincount(batch.found.channels).tolist()))
+        before, times = self.loaded, batch.times
+        messages = dict(enumerate(np.bincount(batch.channels).tolist()))
         if messages:
             first = min([int(times.min()), *([before.first] if before.by_channel else [])])
             counts = Counter(before.by_channel) + Counter(messages)
@@ -152,7 +152,6 @@ class McapFile(BagFile):
         self.size = len(self._data)
         self._blocks: list[ChunkPlace] = []
         self._others: list[RecordExtent] = []  # attachments and metadata
-        self._memory = np.empty(0, np.uint8)
         self._zstd = zstandard.ZstdDecompressor()
         self._data_crc = 0
         self._data_end = 0
@@ -217,9 +216,9 @@ class McapFile(BagFile):
     def messages(self, record: RecordExtent) -> list[Message]:
         """The messages of a chunk record, checked, in their order; its indexes are not needed."""
         place = self._chunk_at(record)
-        buffer, (_, offsets, sizes, _) = self._load([place], place.size)
-        found = zip(offsets.tolist(), sizes.tolist(), strict=True)
-        return [message(buffer[start + HEAD.size : start + DATA + size].tobytes()) for start, size in found]
+        batch = self._load([place], place.size)
+        found = zip((batch.offsets + HEAD.size).tolist(), (batch.offsets + DATA + batch.sizes).tolist(), strict=True)
+        return [message(batch.buffer[start:end].tobytes()) for start, end in found]
 
     def check_all(self) -> None:
         """Compare the checksum of all data with the one at their end, if there is one."""
@@ -345,11 +344,7 @@ class McapFile(BagFile):
         return chunk_of(record, self.content(record._replace(end=min(record.end, record.start + HEAD.size + 24))))
 
     def _load(self, blocks: list[ChunkPlace], size: int) -> MessageBatch:
-        if len(self._memory) < size + TAIL:  # kept, because the system hands out new memory slowly
-            self._memory = np.empty(max(size, BATCH) + TAIL, np.uint8)
-        buffer = self._memory[: size + TAIL]
-        buffer[size:] = 0
-        parts = [Found(*np.empty((4, 0), np.int64))]
+        buffer, parts = np.zeros(size + TAIL, np.uint8), [np.empty((4, 0), np.int64)]
         position = 0
         for block in blocks:
             part = buffer[position : position + block.size]
@@ -361,4 +356,4 @@ class McapFile(BagFile):
                 index = self._data[block.end : block.indexes_end]
             parts.append(find(part, index, self.define, position))
             position += len(part)
-        return MessageBatch(buffer, Found(*map(np.concatenate, zip(*parts, strict=True))))
+        return MessageBatch(buffer, *np.concatenate(parts, axis=1))

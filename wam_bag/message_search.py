@@ -23,35 +23,36 @@ Define = Callable[[int, bytes], None]
 """Takes the opcode and the content of a schema or channel record."""
 
 
-class Found(NamedTuple):
-    """Messages in a buffer in the order of the file, (n,).
+class MessageBatch(NamedTuple):
+    """Some records in memory, and the messages in them in the order of the file, (n,).
 
     Attributes
     ----------
+    buffer : the records.
     channels : ids.
     offsets, sizes : where the record of each starts, and bytes of the message.
     times : of the log, ns.
     """
 
+    buffer: Bytes
     channels: Rows
     offsets: Rows
     sizes: Rows
     times: Times
 
-    def of(self, rows: Mask | Index) -> "Found":
+    def of(self, rows: Mask | Index) -> "MessageBatch":
         """Some of them."""
-        return Found(*(column[rows] for column in self))
+        return MessageBatch(self.buffer, *(column[rows] for column in self[1:]))
+
+    def messages(self) -> list[bytes]:
+        """The messages, serialized."""
+        starts = self.offsets + DATA
+        ends = starts + self.sizes
+        return [self.buffer[start:end].tobytes() for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
 
 
-class MessageBatch(NamedTuple):
-    """Some records in memory, valid until the next batch is taken, and the messages in them."""
-
-    buffer: Bytes
-    found: Found
-
-
-def find(part: Bytes, index: bytes, define: Define, begin: int) -> Found:
-    """The messages among the records of a chunk.
+def find(part: Bytes, index: bytes, define: Define, begin: int) -> Rows:
+    """The messages among the records of a chunk: rows 1 to 4 of a batch, (4, n).
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def find(part: Bytes, index: bytes, define: Define, begin: int) -> Found:
     channels, lengths, times = (heads[name].astype(np.int64) for name in ("channel", "length", "log"))
     if (times < 0).any():
         raise Damage(f"a message has the log time {times.min() % 2**64} ns")
-    return Found(channels, offsets + begin, lengths - (DATA - HEAD.size), times)
+    return np.stack([channels, offsets + begin, lengths - (DATA - HEAD.size), times])
 
 
 def _indexed(part: Bytes, index: bytes) -> Rows:
@@ -107,7 +108,7 @@ def packed(messages: Sequence[tuple[int, int, bytes]]) -> MessageBatch:
     sizes = np.array([len(data) for *_, data in messages], np.int64)
     channels, times = np.array([one[:2] for one in messages], np.int64).reshape(-1, 2).T
     buffer = np.frombuffer(b"".join([*parts, bytes(TAIL)]), np.uint8)
-    return MessageBatch(buffer, Found(channels, np.cumsum(sizes + DATA) - sizes - DATA, sizes, times))
+    return MessageBatch(buffer, channels, np.cumsum(sizes + DATA) - sizes - DATA, sizes, times)
 
 
 def at(buffer: Bytes, offsets: Rows, dtype: str) -> NDArray[Any]:
@@ -115,10 +116,3 @@ def at(buffer: Bytes, offsets: Rows, dtype: str) -> NDArray[Any]:
     kind = np.dtype(dtype)
     view: NDArray[Any] = np.ndarray((max(len(buffer) - kind.itemsize + 1, 0),), kind, buffer, strides=(1,))
     return view[offsets]
-
-
-def messages(buffer: Bytes, found: Found) -> list[bytes]:
-    """The messages, serialized."""
-    starts = found.offsets + DATA
-    ends = starts + found.sizes
-    return [buffer[start:end].tobytes() for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
