@@ -99,7 +99,7 @@ def _explain(path: Path, error: Exception) -> str:
     if not start:
         return f"{path} is empty, nothing was recorded; record again"
     if start != MAGIC:
-        return f"{path} is not MCAP; give a bag recorded with storage 'mcap', or the directory of a compressed one"
+        return f"{path} is not MCAP; give a bag recorded with storage 'mcap'; if it is compressed, give its directory"
     if isinstance(error, NotClosedError):
         return (
             f"{path} was not closed, the recorder was killed or the copy is incomplete; "

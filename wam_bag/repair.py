@@ -56,7 +56,7 @@ def repair(path: Path) -> list[Repaired]:
         return [_repair_file(path)]
     found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
     if not found:
-        raise BagError(f"{path} has no .mcap file; give a bag directory or an .mcap file")
+        raise BagError(f"{path} does not exist, or has no .mcap file; give a bag directory or an .mcap file")
     release(path)
     done = []
     for file in found:

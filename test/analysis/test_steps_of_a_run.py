@@ -261,7 +261,7 @@ def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(se
     recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
     assert math.isnan(forces_of(recording).get("press 4 N: error of the true force", math.nan))
     shown = told(recording.bag())
-    assert "force within 10 %: NOT EVALUATED, 1 of 2 forces lasted less than 1 s" in shown
+    assert "force within 10 %: NOT EVALUATED, 1 of 2 forces shorter than 1 s" in shown
     assert "Forces: 1 of 1 applied, largest error 5.0 %." in shown
     is_hold = "press 4 N: 4 N commanded on outer_link for less than 1 s, so" in shown
     assert is_hold == (seconds > 0.3)  # else it may be part of a ramp
@@ -483,7 +483,7 @@ def test_a_failed_task_leaves_a_report(tmp_path, capsys):
     assert _report(bag, True, task) is not None
     out, err = capsys.readouterr()
     assert "no report of task follow-surface" in err
-    assert "Wrong: Step 'lower onto nothing'" in out
+    assert "Problems: Step 'lower onto nothing'" in out
 
 
 @pytest.mark.slow

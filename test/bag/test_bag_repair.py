@@ -210,7 +210,7 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     assert list(AnalysedRecording(bag).lost) == lines[1:]
     found = analyse_bag(bag, lambda doing: None)
     assert list(found.sections[1].wrong[:2]) == info[:2]
-    assert found.sections[0].sentences[1].startswith(f"Wrong: {info[0]}")
+    assert found.sections[0].sentences[1].startswith(f"Problems: {info[0]}")
     assert found.provenance["lost"] == " ".join(lines[1:])
 
 

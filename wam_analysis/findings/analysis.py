@@ -161,7 +161,7 @@ def analyse_bag(
     """
     recording = AnalysedRecording(bag, namespace, given)
     if recording.is_foreign and not recording.sources:
-        why = " ".join(unread(bag)) or "nothing in it can be analysed, for each topic has too few messages"
+        why = " ".join(unread(bag)) or "nothing in it can be analysed: too few messages"
         raise BagError(f"{bag.path}: {why}")
     made = []
     for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
@@ -178,7 +178,7 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
     shows = [(sentence, section.title) for section in sections for sentence in section.shows]
     shows = shows or [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
     lines = (
-        _line("Wrong", wrong, "nothing was found."),
+        _line("Problems", wrong, "none found."),
         _line("Shows", shows, "nothing that can be evaluated."),
     )
     return Section("verdict", "Verdict", (what, *lines))
@@ -242,7 +242,7 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
         more = f" and {len(named) - LAYOUT.changes} more" * (len(named) > LAYOUT.changes)
         yield (
             f"Changed while it ran: {', '.join(named[: LAYOUT.changes])}{more}. "
-            "Predictions and domains of gains are for the values at the start."
+            "Predictions are for the values at the start."
         )
 
 

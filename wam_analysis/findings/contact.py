@@ -23,8 +23,8 @@ def contact_section(recording: AnalysedRecording) -> Section:
     findings: list[Finding] = []
     wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
     shows: list[str] = []
-    named = [f"{number} {one.step}" for number, one in enumerate(recording.contacts, 1) if one.step]
-    sentences = [f"Contacts by number and step: {', '.join(named)}."] * bool(named)
+    named = [f"{number} ({one.step})" for number, one in enumerate(recording.contacts, 1) if one.step]
+    sentences = [f"Contacts and their steps: {', '.join(named)}."] * bool(named)
     for number, contact in enumerate(recording.contacts, 1):
         name = f"{number} {contact.estimate.link}{' false' * contact.is_false}"
         declared = declared_position(recording, contact)
@@ -54,7 +54,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
     if np.any(known):
         note = "false contacts, and the ends of others"
-        findings.append(Finding("estimated without a contact", "s", traces.false_seconds, note=note))
+        findings.append(Finding("contact estimated where none is", "s", traces.false_seconds, note=note))
         if count := sum(one.is_false for one in recording.contacts):
             share = f"False contacts: {count} of {len(recording.contacts)}."
             (wrong if traces.false_percent > TOUCH.false_tolerance else shows).append(share)
@@ -127,6 +127,6 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
 
 
 def _errors(away: float, off: float) -> str:
-    known = [f"{shown(away, 'cm')} of the position"] * math.isfinite(away)
-    known += [f"{shown(off, 'N')} of the force vector"] * math.isfinite(off)
-    return f"; median error {' and '.join(known)}" * bool(known)
+    known = [f"position {shown(away, 'cm')}"] * math.isfinite(away)
+    known += [f"force vector {shown(off, 'N')}"] * math.isfinite(off)
+    return f"; median error: {', '.join(known)}" * bool(known)

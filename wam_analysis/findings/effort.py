@@ -44,7 +44,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         findings += [
             Finding(f"{one.label}: {what}", unit, known.value, error=known.error) for what, unit, known in numbers
         ]
-        unexplained = f"{100.0 * found.unexplained:.2g} % of the effort's rms is unexplained"
+        unexplained = f"unexplained: {100.0 * found.unexplained:.2f} % of the effort (rms)"
         values = [f"{what} {shown(known.value)} +- {shown(known.error, unit)}" for what, unit, known in numbers]
         brief.append(f"{one.label}: {', '.join(values)}; {unexplained}.")
         missing = [what for what, _, known in every if not (math.isnan(known.value) or known.is_sure)]
@@ -60,8 +60,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
     doubts += [RECORD] * bool(doubts)
     assumed = (
-        "The effort is explained by friction, inertia, the joint's weight, a drag by the square of the velocity and, "
-        "if the fit is better with it, a delay. What is left makes the standard errors larger."
+        "The fit explains the effort by friction, inertia, weight, drag (velocity squared) and, where it fits better, "
+        "a delay. The standard errors include what it does not explain."
     )
     if alone:
         doubts.append(

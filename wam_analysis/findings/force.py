@@ -98,7 +98,7 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     return [
         Finding("largest error, bias plus ripple", "N", smallest),
         Finding("largest held force", "N", largest),
-        Finding("largest force of motors and cables", "N", math.nan, limit.force, by),
+        Finding("largest force that motors and cables allow", "N", math.nan, limit.force, by),
         Finding("dynamic range", "", largest / smallest, note="largest held force over the largest error"),
     ]
 
@@ -183,7 +183,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
-    margin = f"; by the guard, up to {shown(min(margins))} times these gains are stable" if margins else ""
+    margin = f"; predicted stable up to {shown(min(margins))} times these gains" if margins else ""
     if settled and not verdict and not wrong:
         verdict.append(
             f"Stability: {'all forces' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}."
@@ -244,7 +244,7 @@ def _theory_findings(name: str, theory: Theory) -> Iterator[Finding]:
     if theory.guarded is not None:
         guard, surface = theory.guarded.assessment, shown(theory.guarded.surface, "N/m")
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
-        yield Finding(f"{name}: gain margin, up to {GUARD.largest_scale:g}", "", math.nan, guard.scale, note)
+        yield Finding(f"{name}: gain margin (at most {GUARD.largest_scale:g} tried)", "", math.nan, guard.scale, note)
     if theory.predicted is not None and (size := theory.predicted.actuator_peak_to_peak) > 0.0:
         label = f"{name}: actuator cycle at the contact, peak to peak"
         yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")

@@ -18,8 +18,8 @@ from wam_description.event import Code
 from wam_sim.reactions import OUTCOMES, STEADY, unmet
 
 HOW = (
-    "The brackets show the worst value of all steps. The error of a force includes its ripple. "
-    f"A contact of less than {TOUCH.bounce / 1e9:g} s does not count."
+    "In brackets: the worst value of all steps. The error of a force includes its ripple. "
+    f"Contacts shorter than {TOUCH.bounce / 1e9:g} s do not count."
 )
 
 
@@ -153,7 +153,7 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
     answer = _answer(question, errors, HOLD.force_tolerance, "{:.1f} %")
     short = brief + sum(one.hold.is_short for one in done)
-    return answer._replace(remark=f"{short} of {len(held) + brief} forces lasted less than {STEADY:g} s" * bool(short))
+    return answer._replace(remark=f"{short} of {len(held) + brief} forces shorter than {STEADY:g} s" * bool(short))
 
 
 def _command_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:

@@ -71,8 +71,8 @@ class Sticking(NamedTuple):
         if not self.slips:
             return "never moved"
         if not self.stuck and self.slips == 1:
-            turns = ", half the time between two turns," * self.is_turning
-            return f"always in motion; a rest shorter than {shown(self.shortest, 's')}{turns} does not count"
+            turns = ", half the time between two turns" * self.is_turning
+            return f"always in motion (a rest counts from {shown(self.shortest, 's')}{turns})"
         return f"at rest for {100.0 * self.stuck:.0f} % of the time, moved {times(self.slips)}"
 
 

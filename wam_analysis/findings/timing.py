@@ -80,7 +80,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
             gap = shown(found.longest_gap, "s")
             wrong.append(f"{name}: {found.missed} missing, the longest gap {gap}.")
     if recording.is_foreign:
-        stated = "Every period has its message." if findings else "No stamped topic was recorded."
+        stated = "No message is missing." if findings else "No stamped topic was recorded."
         return Section("timing", "Timing", wrong or [stated], findings, wrong=wrong)
     if timed := [facts for facts in recording.loop if RATE in facts]:
         last = timed[-1]

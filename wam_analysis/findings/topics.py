@@ -44,7 +44,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
 def _topic(name: str, columns: Columns) -> Iterator[str]:
     """What a topic holds."""
     if isinstance(columns, JointColumns) and len(columns.stamp_ns):
-        yield f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}."
+        yield f"{name}: {len(columns.stamp_ns)} messages; joints: {', '.join(columns.names)}."
         numbers = np.hstack([columns.position, columns.velocity, columns.effort])
         known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
         if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
@@ -148,7 +148,6 @@ def unread(bag: Bag) -> list[str]:
         return []
     most = sorted(others, key=lambda name: -others[name])[: READING_LIMITS.named]
     listed = ", ".join(f"{name} ({bag.types.get(name, '')})" for name in most) + ", ..." * (len(others) > len(most))
-    number = f"{sum(others.values())} messages of other topics"
     readable = [name for name in most if name not in bag.unread]
-    advice = f"; --topic {readable[0]} --map QUANTITY=FIELD analyses them" if readable else ""
-    return [f"{number} were not analysed: {listed}{advice}."]
+    advice = f"; to analyse them: --topic {readable[0]} --map QUANTITY=FIELD" if readable else ""
+    return [f"Not analysed: {sum(others.values())} messages of {listed}{advice}."]

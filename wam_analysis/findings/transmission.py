@@ -184,7 +184,7 @@ def transmission_friction(run: RecordedRun, parameters: PredictionParameters) ->
         arm = replace(arm, motors=effects.smooth(arm))
     signals = transmission_signals(run, arm)
     if signals is None or len(signals.time) < SHAFT.fewest_signals:
-        return TransmissionFriction(None, unknown=LACKING.format("no motor_states with a load"))
+        return TransmissionFriction(None, unknown=LACKING.format("no motor_states, or no torques of the joints"))
     joints = _friction_of_joints(signals)
     if hidden := _hidden(signals):
         return TransmissionFriction(signals, joints=joints, unknown=hidden)

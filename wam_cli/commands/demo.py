@@ -30,8 +30,8 @@ from wam_sim.simulated_bag import record
 from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
 EXIT_CODES = (
-    "Exit code: 0 if the run was complete and every result is right; 1 if the run failed, or a result is NO or MISSED; "
-    "130 if you stopped it."
+    "Exit code: 0 if the run was complete and every result is right; 1 if the run failed or a result is NO (with "
+    "--task: MISSED); 130 if you stopped it."
 )
 PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
 WITHOUT_ROS = (
@@ -164,7 +164,7 @@ def _report_of_task(task: Experiment, bag: Path, found: Any) -> tuple[str, tuple
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
     wrong = [f"  {one}" for section in found.sections for one in section.wrong]
-    stated = "\n".join([text(task, result), *["", "Wrong"][: 2 * bool(wrong)], *wrong])
+    stated = "\n".join([text(task, result), *["", "Problems"][: 2 * bool(wrong)], *wrong])
     missed = tuple(f"{row.quantity}: MISSED" for row in result.rows if not row.agrees)
     return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed
 
