@@ -144,7 +144,7 @@ class Topic(NamedTuple):
     side : 'motors' or 'joints': whose names a JointState carries.
     columns : of a table, float64 each.
     needs_joint_sensors : whether it exists only on an arm with joint-side sensors.
-    is_viewed : whether viewers show it, for which its publisher copies some of its messages.
+    is_viewed : whether viewers show it.
     """
 
     name: str

@@ -8,6 +8,7 @@ import time
 from typing import Any, Final
 
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from wam_control.contact.contact_table import contact_of, likely_of
@@ -17,7 +18,6 @@ from wam_description.topics import BY_NAME
 from wam_live.snapshot import NAN, Snapshot, objects_of, size
 from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, message_type
-from wam_ros.outlets import NEWEST, copy_name
 from wam_ros.wire import decoder, stamp_in
 
 VIEWED: Final = sorted(topic.name for topic in BY_NAME.values() if topic.is_viewed)
@@ -39,11 +39,10 @@ class RunningStack:
         # its node is in no executor: what has come is taken when a picture is drawn
         self.node = Node("live_view", context=context, namespace=namespace)
         self._covers = shared.arm.covers.names
-        self._topics = {name: self._subscription(name, name) for name in TOPICS}
+        self._topics = {name: self._subscription(name) for name in TOPICS}
         self._decoders = {
             name: decoder(BY_NAME[name], shared, "position?" if "joint" in name else "") for name in TOPICS
         }
-        self._whole = set(VIEWED)  # of which all messages are taken, because copies have not been found
         self._newest: dict[str, Any] = {}
         self._stamps: dict[str, int] = {}
         self.statuses = statuses
@@ -108,19 +107,11 @@ class RunningStack:
             if 0 < stamp <= self.stamp:
                 self._factor = (self.stamp - stamp) / 1e9 / (now - then)
             self._pace = now, self.stamp
-            self._look_for_copies()
         return self._factor
 
-    def _subscription(self, topic: str, name: str) -> Subscription:
-        return self.node.create_subscription(message_type(BY_NAME[topic]), name, print, NEWEST, raw=True)
-
-    def _look_for_copies(self) -> None:
-        """Take the copies of a topic instead of all its messages, where its node makes them."""
-        for topic in sorted(self._whole):
-            if self.node.count_publishers(copy_name(topic)):
-                self._whole.remove(topic)
-                self.node.destroy_subscription(self._topics[topic])
-                self._topics[topic] = self._subscription(topic, copy_name(topic))
+    def _subscription(self, topic: str) -> Subscription:
+        newest = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
+        return self.node.create_subscription(message_type(BY_NAME[topic]), topic, print, newest, raw=True)
 
 
 def _taken(subscription: Any) -> Any:

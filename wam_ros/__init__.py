@@ -2,7 +2,7 @@
 
 - node: the ROS node of a declared node (`wam_description.wiring`)
 - connections: what every node of the stack has on ROS, a driver too, and the other nodes as it hears of them
-- inlets: its subscriptions, from one publisher each; outlets: its publishers, and copies of them for a viewer
+- inlets: its subscriptions, from one publisher each; outlets: its publishers
 - health: its status, problems, refusals and diagnostics
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
 - ros_topics: a topic of the table on ROS: name, quality of service, header

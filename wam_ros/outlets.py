@@ -1,17 +1,12 @@
-"""What a node publishes: encoded, counted, handed to the nodes of its process, and copied for a viewer.
-
-A run that is as fast as it can be sends ten thousand messages a second, and sending one to another process takes the
-sender 10 us.  A viewer needs no more of them than it draws pictures: it takes the copies.
-"""
+"""What a node publishes: encoded, counted, and handed to the nodes of its process."""
 
 import time
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from wam_description.arm import Shared
 from wam_description.topics import Topic
@@ -20,35 +15,6 @@ from wam_ros.messages import message_type
 from wam_ros.ros_topics import qos, topic_name
 from wam_ros.run import end_of_delivery
 from wam_ros.wire import encoder
-
-PERIOD: Final = 1.0 / 30.0  # s of the wall clock, between copies
-NEWEST: Final = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, history=HistoryPolicy.KEEP_LAST, depth=1)
-
-
-def copy_name(topic: str) -> str:
-    """Name of the copies of a topic, which `ros2 topic list` does not show."""
-    return f"_display/{topic}"
-
-
-class DisplayCopy:
-    """Publishes some messages of a topic a second time, for viewers.
-
-    Parameters
-    ----------
-    node : that publishes.
-    row : of the topic.
-    """
-
-    def __init__(self, node: Node, row: Topic) -> None:
-        self._publisher = node.create_publisher(message_type(row), copy_name(row.name), NEWEST)
-        self._next = 0.0
-
-    def send(self, message: Any) -> None:
-        """Publish a message, or its bytes, where the last copy is old enough."""
-        now = time.monotonic()
-        if now >= self._next:
-            self._next = now + PERIOD
-            self._publisher.publish(message)
 
 
 class Outlets:
@@ -75,17 +41,13 @@ class Outlets:
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
         }
-        self._copies = {row.name: DisplayCopy(node, row) for row in rows if row.is_viewed}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
         self.published = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
-        message = self._encoders[topic](stamp, value)
-        self.send(topic, message)
-        if (copy := self._copies.get(topic)) is not None:
-            copy.send(message)
+        self.send(topic, self._encoders[topic](stamp, value))
 
     def send(self, topic: str, message: Any) -> None:
         """Publish a message, or its bytes."""

@@ -59,7 +59,6 @@ from wam_ros.testing import RunningArm
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
-from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
@@ -67,9 +66,8 @@ from wam_live.panel import DITHER, FORCES, NO_PRESS, Bend, Controls, Play, Press
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import Grip, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
-from wam_live.stack_source import VIEWED, RunningStack  # noqa: E402
+from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.messages import message_type  # noqa: E402
-from wam_ros.outlets import PERIOD, DisplayCopy, copy_name  # noqa: E402
 from wam_ros.ros_topics import qos  # noqa: E402
 from wam_ros.wire import encoder  # noqa: E402
 
@@ -513,38 +511,6 @@ def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: Network) ->
     ros.wait(lambda: shown(1, 3_000_000_000).stamp == 3_000_000_000)
     assert stack.snapshot().true.cover == ""
     stack.node.destroy_node()
-
-
-def test_copies_for_the_page_are_few_and_newest_first(ros: Network) -> None:
-    sender, viewer = ros.node("sender"), ros.node("viewer")
-    copy = DisplayCopy(sender, BY_NAME["sim/disturbance"])
-    heard: list[int] = []
-    many = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
-    name = copy_name("sim/disturbance")
-    viewer.create_subscription(WrenchStamped, name, lambda message: heard.append(message.header.stamp.nanosec), many)
-    ros.wait(lambda: sender.count_subscribers(name) == 1 and viewer.count_publishers(name) == 1)
-    begin = time.monotonic()
-    for i in range(1000):
-        message = WrenchStamped()
-        message.header.stamp.nanosec = i
-        copy.send(message)
-    most = 2 + int((time.monotonic() - begin) / PERIOD)
-    ros.wait(lambda: heard)
-    assert len(heard) <= most
-    assert heard[0] == 0
-
-
-def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
-    with ready(domain_id) as (composition, shown, panel, spin):
-        node = composition.nodes["driver"]
-
-        def whole() -> set[str]:
-            listeners = {name: node.get_subscriptions_info_by_topic(f"/wam/{name}") for name in VIEWED}
-            return {name for name, found in listeners.items() if any(one.node_name == "live_view" for one in found)}
-
-        shown.wait(lambda: not whole(), spin)
-        before = panel.snapshot.stamp
-        shown.wait(lambda: panel.snapshot.stamp > before + 10**9 and panel.snapshot.q, spin)
 
 
 def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:

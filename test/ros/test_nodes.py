@@ -27,7 +27,6 @@ from wam_driver.safety import Mode
 from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.node import make_node
-from wam_ros.outlets import copy_name
 from wam_ros.ros_topics import qos, stamp_of
 from wam_ros.testing import RunningArm, playing
 from wam_ros.wire import encoder
@@ -470,8 +469,7 @@ def test_the_live_graph_is_the_interface_table(whole: RunningArm) -> None:
             assert info.topic_type == topic.type
             assert info.qos_profile.durability == durability, f"{info.node_name} of {topic.name}"
     others = {name for name, _ in node.get_topic_names_and_types()} - set(names)
-    copies = {driver.resolve_topic_name(copy_name(name)) for name, row in BY_NAME.items() if row.is_viewed}
-    beside = {name.rsplit("/", 1)[-1] for name in others - copies}
+    beside = {name.rsplit("/", 1)[-1] for name in others}
     assert beside <= {"rosout", "parameter_events"}, "nothing beside the table"
 
 
