@@ -44,8 +44,8 @@ class ProcessLimits:
     processors: int = 3  # processors, of which the driver may have one to itself in realtime
     share: float = 0.8  # of a processor; a process that takes more leaves other programs no time, at its priority
     share_look: float = 2.0  # s, over which that is measured; the start takes less
-    load_look: float = 0.05  # s, in which the idlest processor is found
-    load_steps: int = 10  # of load; within one of them it is chance which processor is the idlest
+    looks: int = 10  # for an idle processor
+    look: float = 0.005  # s before each of them
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,11 @@ and all others the rest.  benchmarks/README.md shows it.
 """
 
 import os
-import random
-import re
 import time
-from collections.abc import Collection, Mapping, MutableMapping
+from collections.abc import MutableMapping
 from contextlib import suppress
 from pathlib import Path
+from statistics import mode
 from typing import Final
 
 from wam_description.arm import Shared
@@ -28,8 +27,8 @@ PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a p
 WAITING: Final = "batch"  # policy SCHED_BATCH
 # share the driver's processor in lockstep where each node has a process: most of the messages are theirs
 CLOSEST: Final = {"transform", "velocity_loop", "gravity"}
-TIMES: Final = Path("/proc/stat")
-IDLE: Final = slice(3, 5)  # columns of a processor's times: idle, and waiting for a disk
+STATE: Final = Path("/proc/thread-self/stat")
+PROCESSOR: Final = 36  # word of it behind the name of the thread
 
 
 def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[str, str]]]:
@@ -53,46 +52,20 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
         closest, policy = set(), []
     else:
         return [(group, {}) for group in groups]
-    idlest, rest = (" ".join([*map(str, part), *policy]) for part in divided(idle_parts(permitted)))
+    inner = {idle_processor()}
+    idle, rest = (" ".join([*map(str, part), *policy]) for part in (inner, permitted - inner or inner))
     names = ({declared(entry).name for entry in group} for group in groups)
     is_apart = ("driver" in group or group <= closest for group in names)
-    return [(group, {PROCESSORS: idlest if one else rest}) for group, one in zip(groups, is_apart, strict=True)]
+    return [(group, {PROCESSORS: idle if one else rest}) for group, one in zip(groups, is_apart, strict=True)]
 
 
-def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
-    """Processors of the inner loop and of all others.
-
-    Parameters
-    ----------
-    idle : part of the time that each permitted processor has been idle, 0 to 1.
-
-    Returns
-    -------
-    The idlest one for the inner loop, the others; both alike where only one is permitted.
-    """
-    inner = max(idle, key=lambda one: (round(PROCESS_LIMITS.load_steps * idle[one]), random.random()))
-    return {inner}, set(idle) - {inner} or {inner}
-
-
-def idle_parts(permitted: Collection[int]) -> dict[int, float]:
-    """Part of the time that processors are idle, 0 to 1, measured for a moment; 0 where the system does not show it."""
-    before = _times()
-    time.sleep(PROCESS_LIMITS.load_look)
-    after = _times()
-    parts = {}
-    for one in permitted:
-        spent = [b - a for a, b in zip(before.get(one, []), after.get(one, []), strict=False)]
-        parts[one] = sum(spent[IDLE]) / (sum(spent) or 1)
-    return parts
-
-
-def _times() -> dict[int, list[int]]:
-    try:
-        text = TIMES.read_text(encoding="ascii")
-    except OSError:
-        return {}
-    lines = re.findall(r"^cpu(\d+) (.*)", text, re.MULTILINE)
-    return {int(number): [int(time) for time in times.split()] for number, times in lines}
+def idle_processor() -> int:
+    """The processor on which the system wakes this thread most often: an idle one, where there is any."""
+    woken = []
+    for _ in range(PROCESS_LIMITS.looks):
+        time.sleep(PROCESS_LIMITS.look)
+        woken.append(int(STATE.read_text(encoding="ascii").rpartition(")")[2].split()[PROCESSOR]))
+    return mode(woken)
 
 
 def keep_to_processors(environment: MutableMapping[str, str]) -> None:

@@ -15,37 +15,21 @@ from wam_ros import processors
 from wam_ros.bring_up import Processes
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.priority import fifo_is_granted
-from wam_ros.processors import PROCESSORS, divided, idle_parts, keep_to_processors, placed_groups
+from wam_ros.processors import PROCESSORS, idle_processor, keep_to_processors, placed_groups
 from wam_ros.run import PARENT
 
 OWN = os.getpriority(os.PRIO_PROCESS, 0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
 
 
-def test_the_inner_loop_has_the_idlest_processor_and_all_others_the_rest_if_there_is_any() -> None:
-    assert divided({0: 0.1, 3: 0.9, 5: 0.4}) == ({3}, {0, 5})
-    assert divided({2: 0.0}) == ({2}, {2})
-
-
-def test_among_processors_that_are_idle_alike_two_arms_choose_by_chance() -> None:
-    chosen = {next(iter(divided({0: 1.0, 1: 0.99, 2: 0.5})[0])) for _ in range(100)}
-    assert chosen == {0, 1}
-
-
-def test_every_permitted_processor_is_looked_at() -> None:
+def test_a_permitted_processor_is_taken_for_the_inner_loop() -> None:
     permitted = os.sched_getaffinity(0)
-    parts = idle_parts(permitted)
-    assert set(parts) == permitted
-    assert all(0.0 <= part <= 1.0 for part in parts.values())
-
-
-def test_a_system_that_shows_no_times_has_no_idle_processor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    permitted = os.sched_getaffinity(0)
-    for file, text in (("none", None), ("another", "cpu 1 2\ncpu9999 1 2 3 4 5\nintr 5 4\n\n")):
-        if text is not None:
-            (tmp_path / file).write_text(text)
-        monkeypatch.setattr(processors, "TIMES", tmp_path / file)
-        assert idle_parts(permitted) == dict.fromkeys(permitted, 0.0)
+    try:
+        for one in permitted:
+            os.sched_setaffinity(0, {one})
+            assert idle_processor() == one
+    finally:
+        os.sched_setaffinity(0, permitted)
 
 
 @pytest.mark.parametrize("given", ["", "x", "-1", "99999999999", "9999"])
@@ -100,6 +84,7 @@ def places(
     """Processors of each process, where the system permits these, and grants SCHED_FIFO or not."""
     monkeypatch.setattr(processors.os, "sched_getaffinity", lambda _: permitted)
     monkeypatch.setattr(processors, "fifo_is_granted", lambda fifo: granted and fifo > 0)
+    monkeypatch.setattr(processors, "idle_processor", lambda: max(permitted))
     return {" ".join(group): place.get(PROCESSORS, "") for group, place in placed_groups(configured.shared, how)}
 
 
@@ -108,8 +93,8 @@ def test_in_realtime_the_driver_s_process_has_a_processor_and_all_others_the_res
     how: str, count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     driver, *others = places(monkeypatch, {0, 1, 2}, how=how).values()
-    assert driver in {"0", "1", "2"}
-    assert [set(place.split()) for place in others] == [{"0", "1", "2"} - {driver}] * count
+    assert driver == "2"
+    assert [set(place.split()) for place in others] == [{"0", "1"}] * count
 
 
 @pytest.mark.parametrize(("permitted", "granted"), [({0, 1, 2, 3}, False), ({0, 1}, True)])
