@@ -16,7 +16,6 @@
 - processors: one that the driver has to itself in realtime
 - process_signals: signals from the imports of a program to its end
 - conformance: a running driver tested against its contract; driver_bench: the node that does it
-- driver_checks: a function for each row of the contract
 - testing: the test kit; pytest_plugin: its fixtures
 - limits: waits, counts and lengths of all these
 - network: limits ROS to this machine; one node of a name in each place

@@ -246,14 +246,25 @@ class StackClient(Closing):
         self.follow_statuses()
         self._require(lambda: "driver" in self.statuses, "no status of the driver")
 
-    def listen(self, topic: str, take: Callable[[int, Any], None], arrays: str = "") -> None:
-        """Let `take` be called with stamp, ns, and value of each good message of a topic; `arrays` as for `decoder`."""
+    def listen(
+        self,
+        topic: str,
+        take: Callable[[int, Any], None],
+        arrays: str = "",
+        refuse: Callable[[str], None] = lambda reason: None,
+    ) -> None:
+        """Let `take` be called with stamp, ns, and value of each good message of a topic; `arrays` as for `decoder`.
+
+        Of each other message, `refuse` is called with the reason.
+        """
         row = self.topics[topic]
         decode = decoder(row, self.shared, arrays)
 
         def receive(data: bytes) -> None:
-            with suppress(Refused):
+            try:
                 take(stamp_in(data), decode(data))
+            except Refused as reason:
+                refuse(str(reason))
 
         self.node.create_subscription(message_type(row), topic, receive, listening(row), raw=True)
 

@@ -4,11 +4,11 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 
 from wam_description.agreement import DIGESTS
 from wam_description.arm import Shared
@@ -24,10 +24,10 @@ from wam_ros.client import StackClient
 from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import diagnostic_status, joint_state, message_type
-from wam_ros.ros_topics import DIAGNOSTICS, NAMESPACE, qos, topic_name
+from wam_ros.ros_topics import CLOCK, DIAGNOSTICS, NAMESPACE, qos, topic_name
 from wam_ros.wire import stamp_in
 
-KEPT = ("motor_states", "motor_currents", "/clock")
+KEPT = {"motor_states": " ".join(State._fields), "motor_currents": "effort"}  # arrays that must be filled
 COMMAND = "motor_current_command"
 Restart = Callable[[], None]
 
@@ -36,12 +36,16 @@ class Untested(Exception):
     """A row cannot be tested; the text states why."""
 
 
+class Wrong(Exception):
+    """A row is wrong; the text states how."""
+
+
 class Arrived(NamedTuple):
-    """A message and when it came, s of the steady clock."""
+    """A message, in the order of the motors, and when it came, s of the steady clock."""
 
     when: float
     stamp: int
-    message: Any
+    value: Any
 
 
 class DriverBench(StackClient):
@@ -81,7 +85,8 @@ class DriverBench(StackClient):
         self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
         self.carrying = [0.0] * len(self.contract.motors)
         self.commanded = list(self.carrying)
-        self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in KEPT}
+        self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in (*KEPT, CLOCK)}
+        self._refused = ""
         self.reported: deque[tuple[float, NodeStatus]] = deque(maxlen=CONFORMANCE_LIMITS.kept)
         self.diagnostics: set[str] = set()
         self.answered = 0
@@ -91,30 +96,27 @@ class DriverBench(StackClient):
         self.wanted: Callable[[int, list[float]], Any] | None = None
         self._session, self._spun = -1, math.inf
         self._command = self.publisher(COMMAND)
-        for topic in KEPT:
-            row = BY_NAME[topic]
-            keep = self._keeping(topic, message_type(row))
-            self.node.create_subscription(message_type(row), topic_name(self.node, row), keep, qos(row), raw=True)
+        for topic, arrays in KEPT.items():
+            self.listen(topic, partial(self._keep, topic), arrays, partial(self._refuse, topic))
+        row, keep = BY_NAME[CLOCK], lambda data: self._keep(CLOCK, stamp_in(data), None)
+        self.node.create_subscription(message_type(row), topic_name(self.node, row), keep, qos(row), raw=True)
         self.node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._take_report, qos(BY_NAME[DIAGNOSTICS]))
         self.follow_statuses()
         self.lacking()  # of a service is there once there is a client
         self.report()
 
-    def _keeping(self, topic: str, kind: Any) -> Callable[[bytes], None]:
-        def keep(data: bytes) -> None:
-            stamp, message = stamp_in(data), deserialize_message(data, kind)
-            self.arrived[topic].append(Arrived(time.monotonic(), stamp, message))
-            if topic == "motor_states":
-                self._answer(stamp, message)
+    def _keep(self, topic: str, stamp: int, value: Any) -> None:
+        self.arrived[topic].append(Arrived(time.monotonic(), stamp, value))
+        if topic == "motor_states" and self.is_answering:
+            self._answer(stamp, value)
 
-        return keep
+    def _refuse(self, topic: str, reason: str) -> None:
+        self._refused = f"{topic}: {reason}"
 
-    def _answer(self, stamp: int, state: Any) -> None:
-        if not self.is_answering:
-            return
+    def _answer(self, stamp: int, state: State) -> None:
         tick = stamp // self._timing.period_ns
-        if tick % self._timing.outer_divisor == 0 and len(state.position) == len(self.contract.motors):
-            q = self._map.joint_positions(list(state.position))
+        if tick % self._timing.outer_divisor == 0:
+            q = self._map.joint_positions(state.position)
             torque = self._map.motor_torques(self._body.gravity_torque(q).tolist())
             self.carrying = [t / k for t, k in zip(torque, self.contract.torque_constant, strict=True)]
         self.commanded = list(self.carrying)
@@ -155,7 +157,7 @@ class DriverBench(StackClient):
 
     def be_proper(self) -> None:
         """Answer again as a velocity loop that is right."""
-        self.is_answering, self.wanted, self.after = True, None, []
+        self.is_answering, self.wanted, self.after, self._refused = True, None, [], ""
         self.report()
 
     # looking
@@ -167,6 +169,7 @@ class DriverBench(StackClient):
 
     def forget(self) -> None:
         """Drop what has come so far."""
+        self._refused = ""
         for kept in self.arrived.values():
             kept.clear()
 
@@ -240,7 +243,17 @@ class DriverBench(StackClient):
             self.watch(CONFORMANCE_LIMITS.settle)
 
     def states(self) -> list[Arrived]:
-        """The states that came."""
+        """The states that came.
+
+        Raises
+        ------
+        Wrong
+            where one of them cannot be read.
+        Untested
+            where too few came.
+        """
+        if self._refused:
+            raise Wrong(self._refused)
         states = list(self.arrived["motor_states"])
         if len(states) < 10:
             raise Untested(f"{len(states)} motor_states came")
@@ -248,12 +261,11 @@ class DriverBench(StackClient):
 
     def flow(self, state: Arrived) -> list[float]:
         """Currents by the effort of a state, A."""
-        effort = list(state.message.effort)
-        return [t / k for t, k in zip(effort, self.contract.torque_constant, strict=False)]
+        return [t / k for t, k in zip(state.value.effort, self.contract.torque_constant, strict=True)]
 
     def is_zero(self, state: Arrived) -> bool:
         """Whether no current flows, by the effort of a state."""
-        pairs = zip(self.flow(state), self.contract.peak, strict=False)
+        pairs = zip(self.flow(state), self.contract.peak, strict=True)
         return all(abs(flow) <= self.tolerance(0.0, peak) for flow, peak in pairs)
 
     @staticmethod
@@ -289,9 +301,7 @@ class DriverBench(StackClient):
             if not (self.arrived["motor_states"] and self.arrived["motor_currents"]):
                 return "no currents come"
             flow = self.flow(self.arrived["motor_states"][-1])
-            sent = list(self.arrived["motor_currents"][-1].message.effort)
-            if not len(flow) == len(sent) == len(wrong):
-                return "an effort is missing"
+            sent = self.arrived["motor_currents"][-1].value.effort
             for i, wanted in enumerate(self.commanded):
                 worst = max(abs(flow[i] - wanted), abs(sent[i] - wanted))
                 wrong[i] += worst > self.tolerance(wanted, contract.peak[i])
@@ -319,8 +329,6 @@ class DriverBench(StackClient):
             self.wait(lambda: not self.after, REPLY)
             self.watch(CONFORMANCE_LIMITS.settle)
             for state in self.states():
-                if not all(map(math.isfinite, state.message.effort)):
-                    return f"{what}: the effort is no longer finite"
                 for i, flow in enumerate(self.flow(state)):
                     if flow * bad[i] > 0.7 * bad[i] ** 2:
                         return f"{what}: its {flow:.3g} A reached {self.contract.motors[i]}"

@@ -187,7 +187,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
     ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     short = replace(CONFORMANCE_LIMITS, start=0.05, look=0.05, service_wait=0.05)
-    for module in ("driver_bench", "driver_checks"):
+    for module in ("driver_bench", "conformance"):
         monkeypatch.setattr(f"wam_ros.{module}.CONFORMANCE_LIMITS", short)
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
     rows = list(conformance_rows(bench.probe, 1))
