@@ -243,25 +243,20 @@ def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:
     return serve
 
 
-def node_factory(entry: str) -> Callable[..., Node]:
-    """What makes the ROS node of an entry of the parameter `nodes`, with all that it needs imported.
+def make_node(entry: str, **ros: Any) -> Node:
+    """The ROS node of an entry of the parameter `nodes`.
 
     Parameters
     ----------
     entry : name in the table of nodes, or 'module:Class' of a node of your own.
+    ros : what rclpy's Node takes.
     """
     declaration = declared(entry)
-    declaration.parameter_class  # noqa: B018 - imports it
     if not declaration.ros_node:
-        return partial(AdaptedNode, declaration)
+        return AdaptedNode(declaration, **ros)
     module, _, name = declaration.ros_node.partition(":")
-    node: Callable[..., Node] = getattr(importlib.import_module(module), name)
+    node: Node = getattr(importlib.import_module(module), name)(**ros)
     return node
-
-
-def make_node(entry: str, **ros: Any) -> Node:
-    """The ROS node of an entry of the parameter `nodes`; `ros` is what rclpy's Node takes."""
-    return node_factory(entry)(**ros)
 
 
 def node_makers(entries: Iterable[str], **ros: Any) -> dict[str, Callable[..., Node]]:

@@ -83,37 +83,32 @@ class TolerantNode(LeavingNode):
         """As that of rclpy."""
         if srv_type in (SetParameters, SetParametersAtomically):
             callback = _refusing_unknown_types(callback)
-        return super().create_service(
-            srv_type, srv_name, self._serving(callback, f"a request to {srv_name}"), **options
-        )
+        bearing = self.bearing(callback, f"a request to {srv_name}", self._refuse)
+        return super().create_service(srv_type, srv_name, bearing, **options)
 
-    def bearing(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        """A callback that does nothing once the node has ended; what it raises is a fault."""
+    def bearing(
+        self, callback: Callable[..., Any], what: str, otherwise: Callable[..., Any] = lambda *_: None
+    ) -> Callable[..., Any]:
+        """A callback that does nothing once the node has ended; what it raises is a fault.
+
+        Its result is that of `otherwise` then.
+        """
 
         @functools.wraps(callback)  # rclpy looks at its signature
         def bear(*arguments: Any) -> Any:
-            if self._has_ended:
-                return None
-            try:
-                return callback(*arguments)
-            except Exception as error:
-                self._take_exception(what, error)
-                return None
+            if not self._has_ended:
+                try:
+                    return callback(*arguments)
+                except Exception as error:
+                    self._take_exception(what, error)
+            return otherwise(*arguments)
 
         return bear
 
-    def _serving(self, callback: Callable[[Any, Any], Any], what: str) -> Callable[[Any, Any], Any]:
-        bearing = self.bearing(callback, what)
-
-        @functools.wraps(callback)
-        def serve(request: Any, response: Any) -> Any:
-            if (answer := bearing(request, response)) is not None:
-                return answer
-            if hasattr(response, "message"):
-                response.success, response.message = False, self._exception_fault
-            return response
-
-        return serve
+    def _refuse(self, request: Any, response: Any) -> Any:
+        if hasattr(response, "message"):
+            response.success, response.message = False, self._exception_fault
+        return response
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """As that of rclpy, whose reason for a name that cannot be set lists nothing."""
