@@ -20,7 +20,7 @@ from rclpy.publisher import Publisher
 from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
-from wam_description.interface import Interface, declared, require_parameters
+from wam_description.interface import Interface, declared, is_packaged, require_parameters
 from wam_description.parameters import ParameterError, dotted, meant
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH, Topic
@@ -29,7 +29,7 @@ from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
 from wam_ros.local_bus import BUSES
-from wam_ros.messages import message_type
+from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
 from wam_ros.wire import decoder, encoder, stamp_in
@@ -145,6 +145,10 @@ class RunningArm:
         self._client.follow_statuses()
         self.node = self._client.node
         self._streams: dict[str, tuple[int, Any]] = {}  # until a stamp, ns: a value
+        every = self.interface.declarations.values()
+        untaken = {topic for one in every if not is_packaged(one) for topic in one.outputs}
+        untaken.difference_update(*(one.inputs for one in every))
+        self._untaken = [name for name, row in self.interface.topics.items() if row.is_numbers and name in untaken]
         self._listen()
         return self
 
@@ -261,11 +265,17 @@ class RunningArm:
         return self._refusals()[topic]
 
     def _refusals(self) -> dict[str, str]:
-        """The node that refused a message last and its reason, by topic."""
+        """The node that refused a message last and its reason, by topic; this kit looks at what no node takes."""
         found = ((name, node.health.refusals) for name, node in self.nodes.items() if hasattr(node, "health"))
-        return {
+        refused = {
             topic: f"{name}: {one.reason}" for name, refusals in found for topic, one in refusals.items() if one.count
         }
+        for topic in self._untaken:
+            try:
+                self.newest(topic)
+            except Refused as reason:
+                refused[topic] = f"the test, as no node takes it: {reason}"
+        return refused
 
     def _present_fault(self) -> str:
         return str(self._driver.safety.fault) if self._driver else ""

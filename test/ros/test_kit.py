@@ -1,5 +1,6 @@
 """The test kit: what `arm` does for a test, also of a user's own node, and what it leaves behind."""
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from wam_description.event import Level
 from wam_description.parameters import Nothing, ParameterError, parameter
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
-from wam_description.topics import BY_NAME, TASK_COLUMNS
+from wam_description.topics import BY_NAME, JOINT_STATE, TASK_COLUMNS, Topic
 from wam_description.wiring import Input, Outputs, reaction
 from wam_ros.testing import ArmFault, RunningArm, configured
 from wam_ros.wire import encoder
@@ -55,6 +56,14 @@ class Raising(Damping):
     @reaction(Input("joint_states", "velocity"), outputs=OUTPUTS)
     def step(self, inputs: Inputs) -> Outputs:
         raise ZeroDivisionError
+
+
+class Unread(Raising):
+    name, topics = "unread", (Topic("share", JOINT_STATE, "outer", "a share of each joint", "joints"),)
+
+    @reaction(Input("joint_states", "velocity"), outputs=("share",))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {"share": State([], [], [math.nan] * 4)}
 
 
 def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningArm) -> None:
@@ -151,6 +160,14 @@ def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     arm.send("sim/disturbance", frame="outer_lnk", force=(0.0, 1.0, 0.0))
     with pytest.raises(ArmFault, match=r"sim/disturbance is refused by driver: .*outer_lnk"):
         arm.run(0.1)
+
+
+def test_a_number_that_is_none_is_an_exception_though_no_node_takes_it(arm: RunningArm) -> None:
+    arm.start(Unread, nodes=INNER)
+    with pytest.raises(ArmFault, match="share is refused by the test, as no node takes it: effort of joint1 is nan"):
+        arm.run(0.1)
+    arm.run_until_refused("share")
+    arm.run(0.1)
 
 
 def test_a_node_that_raises_is_named(arm: RunningArm) -> None:
