@@ -121,10 +121,10 @@ def test_a_force_rises_from_that_of_the_step_before_in_its_own_frame() -> None:
 def test_a_step_until_a_force_ends_when_it_is_detected() -> None:
     scenario = Scenario([ScenarioStep("lower", 1.0, tuple(GOAL), until_force=2.0), ScenarioStep("then", 1.0)])
     assert play(scenario, 20, contact=touching(1.9))[-1].step == "lower"
-    out = play(scenario, 1, contact=touching(-2.0))[0]
+    out = play(scenario, 1, q=[0.1] * 4, contact=touching(-2.0))[0]
     assert out.step == "then"
     assert out.failure == ""
-    assert out.posture != GOAL, "it stays where the path was left"
+    assert out.posture == [0.1] * 4, "it presses no harder"
     assert play(scenario, 10)[-1].posture == out.posture
 
 

@@ -43,7 +43,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "frame; `rise`, rise time of the force, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "torque of each joint on the world, N m; the scenario sends it as a `task`",
-    "until_force": "force, N; the step ends when a contact with this force is detected; it fails if there is none",
+    "until_force": "force, N; the step ends when a contact with this force is detected, and the arm stays there "
+    "if the next step has neither motion nor force; it fails if there is none",
     "chirp": "`{newtons, from, to}`: adds a sine to `force`, in the same direction. `newtons`: amplitude, N. The "
     "frequency goes from `from` to `to`, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "
@@ -253,7 +254,9 @@ class Scenario:
         self._index, self._elapsed = index, 0.0
         step = self.steps[index]
         self._before = before.force if before else NO_FORCE
-        if before is not None and before.presses and (step.moves or not step.presses):
+        rests = not step.commands_arm
+        has_pressed = before is not None and (before.presses or (before.until_force > 0.0 and rests))
+        if has_pressed and (step.moves or rests):
             self._posture = list(q)
         try:
             self._motion = motion_of(step, self._posture, self._shared)
