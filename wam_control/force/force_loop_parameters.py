@@ -19,7 +19,7 @@ class LimitParameters:
     """Where the force loop stops the arm."""
 
     joint_gain: float = parameter(
-        "largest speed of a joint towards its end, per distance from it; 0: the ends are not watched",
+        "largest speed of a joint towards its limit, per distance from the limit; 0: joint limits are not watched",
         "1/s",
         high=100.0,
         live=True,
