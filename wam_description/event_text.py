@@ -138,7 +138,7 @@ SENTENCES: Final = {  # by cause
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old; allowed: {allowed_ms:.0f} ms; {cure}",
-    "driver_late": "the driver itself did not run for {time:.2f} s; allowed: {allowed:g} s; {cure}",
+    "node_late": "the {what} itself did not run for {time:.2f} s; allowed: {allowed:g} s; {cure}",
     "held_up": "the driver itself did not run for {time:.2f} s; allowed: {allowed:g} s; {step}: make the steps of "
     "that node faster, or run it in its own process",
     "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}",

@@ -1,7 +1,7 @@
 """The status of a node as key-value pairs and back: the one place that knows the keys."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from wam_description.event import Code, Event, Level, Value, refused
@@ -81,7 +81,6 @@ def guidance(
     mode: str,
     before: str,
     wait: str,
-    faulty: Sequence[str],
     namespace: str,
     is_played: bool,
     held: str,
@@ -92,15 +91,12 @@ def guidance(
     ----------
     mode, before : the driver's state, and that before it, '' at the start.
     wait : what a braked driver waits for, '' for nothing.
-    faulty : nodes that report a fault.
     namespace : of the arm.
     is_played : whether a scenario makes the calls.
     held : what holds an arm that is not enabled.
     """
     if mode == "braked" and wait:
         return f"braked; {wait}"
-    if mode == "braked" and faulty:
-        return f"braked; a fault is reported by {', '.join(faulty)}: enable is refused until the fault is over"
     if mode == ENABLED:
         return "enabled: the motors follow the commands"
     if is_played or (mode == "braked" and before == ENABLED):

@@ -322,7 +322,8 @@ class Synchroniser:
         if not self._last or -spec.limit_ns <= age <= spec.limit_ns:
             return
         far = "older than" if age > 0 else "ahead of"
-        cure = "this node is late; end other programs if the computer is busy" if spec.streamed else CURE
+        late = f"this node, or its {self._trigger}, is late; end other programs if the computer is busy"
+        cure = late if spec.streamed else CURE
         raise OutOfTime(
             f"stamp {stamp} ns is {seconds(abs(age)):.3g} s {far} the newest state that this node has, {self._last} "
             f"ns, allowed: {seconds(spec.limit_ns):.3g} s; {cure}"

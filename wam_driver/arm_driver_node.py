@@ -51,13 +51,14 @@ class ArmDriver(StackNode):
         self.session = Session(chain, 0 if is_lockstep else int(time.time() * 1e3))  # ms: no driver before had it
         self._mode, self._answered = Mode.BRAKED, 0  # newest state, ns, that a command has answered
         self._reported: tuple[Any, ...] = ("",)
-        self._informed = ("", True, tuple[str, ...](), "")  # mode, are nodes missing, faulty nodes, advice
+        self._informed = ("", True, "", False)  # mode, are nodes missing, advice, is a reset arm kept from moving
         self.inlets.feed("motor_current_command", self._take_currents, "effort")
         self.serve("enable", SetBool, lambda request: self.enable() if request.data else self.disable())
         self.serve("estop", Trigger, lambda _: self.estop())
         self.serve("reset_fault", Trigger, lambda _: self.reset_fault())
         self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
         self.create_timer(NODE_LIMITS.claim_period, self._forget_nodes)
+        self.create_timer(NODE_LIMITS.claim_period, self._inform)
 
     # what a driver adds
 
@@ -113,9 +114,13 @@ class ArmDriver(StackNode):
 
     def enable(self) -> Answer:
         """Let the motors follow commands, unless there is a reason against it."""
+        return self.safety.enable(self._reason())
+
+    def _reason(self) -> str:
+        """What `enable` is refused for, '' where nothing."""
         rival = TWO_DRIVERS if self.count_publishers("motor_states") > 1 else ""
         faults = "; ".join(f"{node}: {why}" for node, why in self.peers.faulty.items())
-        return self.safety.enable(self.health.problem or self.unready or rival or faults or self.obstacle())
+        return self.health.problem or self.unready or rival or faults or self.obstacle()
 
     def disable(self) -> Answer:
         """Brake at once."""
@@ -127,7 +132,7 @@ class ArmDriver(StackNode):
 
     def reset_fault(self) -> Answer:
         """Clear a latched fault; the arm stays braked."""
-        return self.safety.reset_fault()
+        return self.safety.reset_fault(self._reason())
 
     def trip(self, event: Event) -> None:
         """Brake, latch a fault, and `announce` it."""
@@ -231,12 +236,15 @@ class ArmDriver(StackNode):
     def _inform(self) -> None:
         """Print on the console what the driver's state is and what to call next, where that has changed."""
         mode, absent = self.health.status.mode, self.peers.absent
+        before, *_, was_kept = self._informed
         is_braked = mode == Mode.BRAKED.value
-        faulty, advice = (tuple(self.peers.faulty), self.advice) if is_braked else ((), "")
-        state = (mode, bool(absent), faulty, advice * (not absent))
+        wait = self.advice if is_braked else ""
+        # at the start commands come only after the nodes
+        reason = self._reason() if is_braked and (was_kept or before == Mode.FAULT.value) else ""
+        state = (mode, bool(absent), wait * (not absent), bool(reason))
         if mode and state != self._informed:
-            before, self._informed = self._informed[0], state
+            self._informed = state
             is_played = "scenario" in self.shared.nodes
-            wait = f"not connected yet: {', '.join(absent)}" if absent else advice
-            text = guidance(mode, before, wait, faulty, self.get_namespace(), is_played, self.safety.held)
+            wait = f"not connected yet: {', '.join(absent)}" if absent else wait or reason
+            text = guidance(mode, before, wait, self.get_namespace(), is_played, self.safety.held)
             self.get_logger().info(text)

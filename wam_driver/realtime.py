@@ -91,9 +91,10 @@ class Realtime:
         most = max(1, round(self._watchdog / self._timing.period))
         if due > most and self._driver.safety.mode is Mode.ENABLED:
             late = {"time": due * self._timing.period, "allowed": self._watchdog}
-            step = self._held_up()
             cure = "give it a processor of its own, or use lockstep"
-            event = fault("held_up", step=step, **late) if step else fault("driver_late", cure=cure, **late)
+            event = fault("node_late", what="driver", cure=cure, **late)
+            if step := self._held_up():
+                event = fault("held_up", step=step, **late)
             self._driver.safety.trip(event)
         for left in range(min(due, most) - 1, -1, -1):
             self._driver.advance(age)

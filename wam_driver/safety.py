@@ -78,10 +78,10 @@ class Safety:
         if not any(one.values[CAUSE] == event.values[CAUSE] for one in self.events):
             self.mode, self.events = Mode.FAULT, (*self.events, event)
 
-    def reset_fault(self) -> Answer:
-        """Clear the fault; the arm stays braked."""
+    def reset_fault(self, obstacle: str = "") -> Answer:
+        """Clear the fault; the arm stays braked, and `obstacle` names what `enable` would be refused for."""
         if self.mode is not Mode.FAULT:
             return Answer(True, f"{self.mode.value}: no fault was latched")
         cleared, self.events = self.fault, ()
         self.mode = Mode.BRAKED
-        return Answer(True, f"braked: fault '{cleared}' cleared; call enable to move")
+        return Answer(True, f"braked: fault '{cleared}' cleared; {obstacle or 'call enable to move'}")

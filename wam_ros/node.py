@@ -1,6 +1,7 @@
 """The adapter that makes a ROS node from a declared one (`wam_description.wiring`)."""
 
 import importlib
+import math
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,6 +26,7 @@ from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
 from wam_ros.health import WAITING
+from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.requests import Request, RequestQueue
@@ -53,7 +55,8 @@ class AdaptedNode(StackNode):
         self.is_first = getattr(node, "high_priority", False)
         self._declaration, self._checks = declaration, self.interface.checks(declaration)
         self._is_realtime = shared.timing.mode == "realtime"
-        self._worked = 0  # stamp of the last step, ns
+        self._worked, self._began = 0, math.inf  # the last step: its stamp, ns, and begin, s on the steady clock
+        self._pause = (0.0, -math.inf)  # s without a step, longer than inputs stay valid, and its end
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
         self._since, self._is_enabled = 0, False
         self._requests = RequestQueue(self, self._take_refusal)
@@ -131,6 +134,9 @@ class AdaptedNode(StackNode):
             return  # in lockstep the driver waits for all
         self.health.counts["steps"] += 1
         self._worked, name, began = inputs.stamp, self._declaration.name, time.monotonic()
+        if (pause := began - self._began) > self.shared.ages.feedback:
+            self._pause = pause, began
+        self._began = began
         STEPS.begin(name, began)
         try:
             try:
@@ -183,17 +189,24 @@ class AdaptedNode(StackNode):
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
 
     def _watch(self, feed: Feed) -> None:
-        """Let an enabled driver brake where an input has stopped to come without which the node cannot control."""
+        """Let an enabled driver brake where an input has stopped to come without which the node cannot control.
+
+        What a node lacks just after it did not run itself is the consequence of that.
+        """
         health, needed = self.health, feed.essential & getattr(self.node, "needs", feed.essential)
         ages = {topic: age for topic, age in feed.synchroniser.ages().items() if topic in needed}
-        if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
+        if max(ages.values(), default=0.0) <= 1.0:
             health.set_problem("inputs", None)
-        elif "inputs" not in health.problems:
+        elif self._is_enabled and "inputs" not in health.problems:
             lost, stopped = self.interface.silent(ages)  # on a busy machine another node may just have been late
             topics = " and ".join(lost)
             problem = fault("stopped", nodes=", ".join(stopped), topics=topics)
-            if step := self.peers.held_up(stopped):
+            pause, ended = self._pause
+            if step := self.peers.held_up({*stopped, self.get_name()}):
                 problem = fault("long_step", step=step, topics=topics)
+            elif self._began - ended < NODE_LIMITS.long_step_recent:
+                late = {"time": pause, "allowed": self.shared.ages.feedback}
+                problem = fault("node_late", what="node", cure="end other programs if the computer is busy", **late)
             health.set_problem("inputs", problem)
 
     # what the other nodes report, live parameters, requests

@@ -90,8 +90,8 @@ class Stack:
         return int(self.driver.stamp)
 
     def thaw(self) -> None:
-        """Let the node go on with what has waited."""
-        for subscription, callback, waiting in self._frozen:
+        """Let the node go on with what has waited, the status last: it does not know yet that the brakes are on."""
+        for subscription, callback, waiting in reversed(self._frozen):
             subscription.callback = callback
             for message in waiting:
                 callback(message)
@@ -118,10 +118,13 @@ def test_a_node_that_is_frozen_is_named_and_the_current_is_zero_within_50_ms(
     frozen = stack.freeze(name)
     ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
     stack.wait_periods(100)
-    stack.thaw()
     assert LOST[name] in stack.fault
     assert stack.last_flow() - frozen <= LIMIT
     assert stack.driver.currents == [0.0] * 4
+    assert name in stack.nodes["driver"].reset_fault().message.partition(" cleared; ")[2], "it does not answer yet"
+    stack.thaw()
+    stack.wait_periods(10)
+    assert all(text not in stack.fault for other, text in LOST.items() if other != name)
     stack.enable()
 
 
