@@ -88,8 +88,8 @@ class HeldForce(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The most of that force, N."""
-        return float(np.nanmax(self.true if len(self.true) else self.measured))
+        """The largest magnitude of that force, N."""
+        return float(np.nanmax(np.abs(self.true if len(self.true) else self.measured)))
 
 
 def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
