@@ -23,16 +23,16 @@ COMMANDS = {
     "node": "start nodes in one process, with ROS arguments if needed",
     "call": "make a request to a running stack, such as enable or set",
     "live": "show a running stack or a recording in the browser",
-    "bag": "record a running stack, list a bag or repair it",
+    "bag": "record a running stack; print what is in a bag, or repair it",
     "analyse": "analyse a recording and compare it with theory",
     "identify": "identify friction, gravity and inertia from a recording",
     "replay": "run a node on its recorded inputs, compare its outputs",
     "experiment": "run experiments of the thesis and compare them with theory",
     "sweep": "play a scenario with many parameter sets; write table and plot",
     "evaluate": "run a benchmark, such as contact or force; draw the figures",
-    "guard": "show how stable a force loop is",
-    "conform": "test a driver against the contract in docs/driver.md",
-    "model": "print the arm as URDF or MJCF, or its scorecard",
+    "guard": "check whether a force loop is stable, and with what margin",
+    "conform": "test whether a driver does what docs/driver.md requires",
+    "model": "print the arm as URDF or MJCF, or compare it with the thesis",
 }
 
 COMPLETING = "_ARGCOMPLETE"  # set by a shell that asks how a line may go on

@@ -240,20 +240,20 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="how the nodes share processes. each (also without a value): one process for each node. grouped: one for "
-        "driver and velocity loop, one for the recorder, one for each node of your own without high_priority, one for "
-        "the rest. Default: one process for all; in realtime: grouped",
+        help="in which processes the nodes run. each (also without a value): every node in its own. grouped: driver "
+        "and velocity loop in one; the recorder, and each node of your own without high_priority, in its own; all "
+        "others in one. Default: all in one; in realtime: grouped",
     )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="follow the wall clock and wait for no command, as a real arm; default: timing.mode of the configuration",
+        help="let the arm move by the wall clock, also if a command is late, as a real arm does; default: timing.mode",
     )
     parser.add_argument(
         "--real-time-factor",
         type=bounded(float),
         metavar="FACTOR",
-        help="pace of lockstep; 1: as the wall clock, 0: as fast as possible; default: timing.real_time_factor",
+        help="speed in lockstep; 1: as the wall clock, 0: as fast as possible; default: timing.real_time_factor",
     )
 
 
@@ -328,8 +328,8 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
 
 OTHER_ROBOT = (
     ("--topic", "TOPIC", "analyse this topic only; with --map it may have any type"),
-    ("--joint", "JOINT", "analyse this joint only; or give names to the joints of messages without names"),
-    ("--command", "TOPIC", "topic of the commands; default: the reference in the messages of the controller's state"),
+    ("--joint", "JOINT", "analyse this joint only; if the messages name no joints: names for them, in order"),
+    ("--command", "TOPIC", "topic of the commands; default: the reference in the controller state messages"),
     (
         "--map",
         "QUANTITY=FIELD",
@@ -341,7 +341,7 @@ OTHER_ROBOT = (
 
 def take_topic_map(parser: argparse.ArgumentParser) -> None:
     """Give a command the options of what is taken from another robot's recording."""
-    other = parser.add_argument_group("a recording of another robot", "each may be repeated")
+    other = parser.add_argument_group("for a recording of another robot", "may be repeated:")
     for option, name, text in OTHER_ROBOT:
         dest = f"only_{option[2:]}"  # `command` is that of the program
         other.add_argument(option, dest=dest, action="append", default=[], metavar=name, help=text)

@@ -16,16 +16,16 @@ from wam_description.parameters import values
 
 RECORDER = "recorder"
 OF_RECORDER = (
-    "Time, nodes and arm are those of the running stack; of --config and --set, only the parameters of the node "
-    "recorder are used."
+    "Time, nodes and arm are those of the running stack. --config and --set change only the parameters of the node "
+    "recorder."
 )
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `wam bag` to its parser."""
     requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
-    for name, text in (("info", "print the contents of a bag"), ("repair", "repair a broken bag")):
-        requests.add_parser(name, help=text, description=text).add_argument(
+    for name, text in (("info", "print what is in a bag"), ("repair", "repair a broken bag")):
+        requests.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.").add_argument(
             "bag", help="directory of the bag, or an .mcap file", type=Path
         )
     text = "record every topic of a running stack until Ctrl-C"

@@ -31,9 +31,9 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "disable": ("brake the arm", (Call("driver", "enable", False),)),
     "estop": ("stop at once; the arm stays stopped until reset_fault", (Call("driver", "estop"),)),
     "reset_fault": ("end a fault whose cause is gone", (Call("driver", "reset_fault"),)),
-    "confirm_home": ("confirm that a real arm is at its home pose", (Call("driver", "confirm_home"),)),
+    "confirm_home": ("report to the driver that a real arm is in its home pose", (Call("driver", "confirm_home"),)),
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
-    "tare": ("let the present external torques count as zero force", (Call("force_loop", "tare"),)),
+    "tare": ("set the measured forces to zero, while nothing touches the arm", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
     "step": (
         "pause, then advance the simulated arm by one period",

@@ -38,8 +38,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=COUNT,
         default=0,
         metavar="VERSION",
-        help="start a simulated arm with this firmware, e.g. 200, in a process of its own on the bus of --bus, e.g. "
-        "udp_multicast:239.74.163.2",
+        help="first start a simulated arm with this firmware, e.g. 200, as another process on the bus that --bus "
+        "names, e.g. udp_multicast:239.74.163.2",
     )
     parser.add_argument(
         "--dry-run",
@@ -57,23 +57,22 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded(float, unit="A"),
         default=0.4,
         metavar="A",
-        help="test current of the first motor in A, of either sign, added to what carries the links; default: "
-        "%(default)s",
+        help="test current of the first motor, A; its sign sets the direction; it is added to the current that carries "
+        "the links; default: %(default)s",
     )
     parser.add_argument(
         "--share",
         type=bounded(float, 0.0, 1.0),
         default=0.9,
         metavar="FRACTION",
-        help="fraction of the periods in which a state must come; default: %(default)s",
+        help="fraction of the periods in which the driver must publish a state; default: %(default)s",
     )
     parser.add_argument(
         "--attempts",
         type=COUNT,
         default=5,
         metavar="N",
-        help="attempts at each row of the contract; on a busy computer a correct driver may need more; default: "
-        "%(default)s",
+        help="how often a check that fails is tried; on a busy computer more may be needed; default: %(default)s",
     )
     parser.epilog = (
         "The test enables the driver many times, and small currents flow. On a real arm, keep its range clear and "

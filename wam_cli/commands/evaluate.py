@@ -71,7 +71,11 @@ def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study
         "--cases", type=COUNT, metavar="N", help=f"number of cases of each seed, default {kind.count or 'all'}"
     )
     parser.add_argument(
-        "--only", type=bounded(int), nargs="+", metavar="NUMBER", help="only these cases, each printed in full"
+        "--only",
+        type=bounded(int),
+        nargs="+",
+        metavar="NUMBER",
+        help="run only the cases with these numbers, and print everything about each",
     )
     parser.add_argument(
         "--write", type=PAGE, help=f"write the result into a page, for example {kind.page or 'docs/PAGE.md'}"

@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples",
         choices=("check", "make"),
-        help="check: compare sizes and checksums of the sample bags with their index in --directory. make: record them "
+        help="check: compare the sample bags in --directory with sizes and checksums in index.yaml. make: record them "
         "again. Without names of experiments: all experiments and tasks",
     )
     parser.add_argument(

@@ -28,12 +28,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_configuration(parser, default=None)
     parser.epilog = f"Without options: the packaged arm, {BASE_CONFIGURATION}."
     own = parser.add_argument_group(
-        "a force loop of your own", "give the first six, all in rotary or all in linear units"
+        "for a force loop of your own", "the first six are needed, all for a rotary or all for a linear loop:"
     )
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
     own.add_argument("--stiction", type=float, help="static friction, N m or N; default: the dynamic friction")
-    own.add_argument("--limit", type=float, default=math.inf, help="saturation of the error, N m or N; default: none")
+    own.add_argument(
+        "--limit", type=float, default=math.inf, help="bound of the force error (saturation), N m or N; default: none"
+    )
     own.add_argument("--rate", type=float, default=0.0, help="sampling rate, Hz; default: 0, a continuous loop")
     own.add_argument("--delay", type=float, default=0.0, help="delay from sample to command, s; default: 0")
     own.add_argument(

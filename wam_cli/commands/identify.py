@@ -52,7 +52,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--excite",
         metavar="SCENARIO",
         type=MOVES,
-        help="write a scenario with informative moves, play it in the simulation and identify from its bag",
+        help="write a scenario that moves all joints, play it in the simulation and identify from its bag",
     )
     length = bounded(float, 10.0, 3600.0, "s")  # the choice of its moves takes minutes
     parser.add_argument("--seconds", type=length, help="with --excite: length of the motion in s, default 60")
@@ -62,7 +62,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--write", type=MODEL, metavar="YAML", help="write the model as a configuration")
     parser.add_argument(
-        "--force", action="store_true", help="with --write: also write a model that contradicts the configured arm"
+        "--force", action="store_true", help="with --write: write the model even if it contradicts the configured arm"
     )
     take_arm(parser)
     take_configuration(parser)

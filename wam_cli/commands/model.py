@@ -15,7 +15,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "format",
         choices=("urdf", "mjcf", "scorecard"),
-        help="urdf, mjcf: the arm in this format; scorecard: the requirements for force control of chapter 3",
+        help="urdf, mjcf: the arm in this format; scorecard: a table of the arm and the requirements of chapter 3",
     )
     parser.add_argument(
         "--ros2-control",

@@ -68,20 +68,22 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(
-        "--list", action="store_true", help="run k takes the k-th value of each --vary; default: all combinations"
+        "--list",
+        action="store_true",
+        help="run 1 takes the first value of each --vary, and so on; default: all combinations",
     )
     kind.add_argument(
         "--random",
         type=bounded(int, 1, MOST_SETS),
         metavar="RUNS",
-        help="draw this many random sets, each value between the two that --vary gives: log-uniform if both are above "
-        "0, else uniform; not for whole numbers",
+        help="draw this many random sets; --vary gives the lowest and highest value: log-uniform if both are above 0, "
+        "else uniform; whole numbers cannot be drawn",
     )
     parser.add_argument("--seed", type=SEED, help="seed of --random; default: 1")
     parser.add_argument(
         "--picture",
         type=PICTURE,
-        help="plot the force error, or what an experiment measures, over each parameter: PNG, PDF or SVG",
+        help="plot into this PNG, PDF or SVG: the force error, or the results of the experiment, over each parameter",
     )
     take_batch(parser, "sweep")
 
