@@ -121,7 +121,7 @@ class Arm:
             x = _turned_x(cover.rotation)
             ends = [start + cover.length * along for start, along in zip(cover.origin, x, strict=True)]
             link = links.index(cover.link)
-            coupled = f"; another length of {cover.name} changes arm.covers.length and end, {{}}, "
+            coupled = f"; to change the length of {cover.name}, change arm.covers.length and end, {{}}, "
             coupled += "and arm.links.mass, centre, inertia"
             if link + 1 < len(links):
                 following = joints[link + 1]
@@ -150,15 +150,15 @@ class Arm:
             before = (-own.length, 0.0, -own.offset)  # the joint before, in this link's frame
             require(
                 min(math.hypot(*cover.origin), math.dist(cover.origin, before)) <= MODEL.same_point,
-                f"{cover.name}: arm.covers.origin is {_point(cover.origin)} m; its link begins at (0, 0, 0) or, by "
-                f"arm.joints.offset of {own.name}, at {_point(before)}"
+                f"{cover.name}: arm.covers.origin is {_point(cover.origin)} m; allowed: (0, 0, 0), or "
+                f"{_point(before)}, where {own.name} begins by arm.joints.length and offset"
                 + coupled.format("arm.covers.origin, arm.joints.offset"),
             )
             far = max(cover.start[0], cover.end[0])
             require(
                 far <= cover.length + MODEL.same_point,
-                f"{cover.name}: the tube ends at {far:g} m, arm.covers.end, but arm.covers.length is {cover.length:g} m"
-                + coupled.format(here),
+                f"{cover.name}: arm.covers.start and end reach up to {far:g} m, but arm.covers.length is "
+                f"{cover.length:g} m" + coupled.format(here),
             )
 
     def _require_plausible(self) -> None:

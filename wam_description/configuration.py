@@ -153,7 +153,7 @@ class Configuration(NamedTuple):
             if not any(_may_be(str(entry), name) for entry in listed):
                 known = ", ".join(section for section in self.sections if section != SHARED)
                 raise ParameterError(
-                    f"{path}: section '{SHARED}/{name}' belongs to no node in 'nodes'; sections of the base: {known}"
+                    f"{path}: section '{SHARED}/{name}' belongs to no node in 'nodes'; sections of the {BASE}: {known}"
                 )
         if any(":" in str(entry) for entry in listed):  # a node of one's own may have more parameters
             for name, flat in changes.items():
@@ -371,7 +371,10 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     if isinstance(tree, dict) and (near := [key for key in tree if difflib.get_close_matches(str(key), [BASE])]):
         raise ParameterError(f"{path} has the key '{near[0]}'; did you mean '{BASE}'?")
     if not isinstance(tree, dict) or (whole and SHARED not in tree):
-        raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")
+        raise ParameterError(
+            f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top, or '{BASE}: wam' if "
+            "it only changes another configuration"
+        )
     if whole and list(tree)[-1] != SHARED:
         raise ParameterError(
             f"{path}: section '{list(tree)[-1]}' comes after '{SHARED}'; make '{SHARED}' the last one, "
@@ -381,7 +384,10 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     for key, body in tree.items():
         name = SHARED if key == SHARED else str(key).removeprefix(SHARED + "/")
         if name == key != SHARED or "/" in name.replace(SHARED, ""):
-            raise ParameterError(f"{path}: section {key!r} is not allowed; write '{SHARED}' or '{SHARED}/<node name>'")
+            raise ParameterError(
+                f"{path}: section {key!r} is not allowed; write '{SHARED}' for all nodes or '{SHARED}/<node name>' for "
+                "one"
+            )
         if not isinstance(body, dict) or list(body) != [PARAMETERS] or not isinstance(body[PARAMETERS], dict):
             raise ParameterError(
                 f"{path}: section '{key}' needs '{PARAMETERS}:' with names and values below it, and nothing else"

@@ -267,8 +267,8 @@ def declaration(node: type[Declared]) -> Declaration:
     sources, listens = getattr(node, "sources", ()), getattr(node, "listens", ())
     missing = [item for item in ("name", "parameters") if not hasattr(node, item)]
     if missing or not (reactions or sources or listens or hasattr(node, "ros_node")):
-        lack = " and ".join(missing) or "no method with @reaction"
-        raise TypeError(f"{node.__module__}:{node.__qualname__} is no node: {lack}; see wam_description.wiring")
+        lack = " and ".join(missing) or "a method with @reaction"
+        raise TypeError(f"{node.__module__}:{node.__qualname__} is no node: it lacks {lack}; see docs/own-node.md")
     extra = tuple(getattr(node, "topics", ()))
     for topic in extra:
         topic.check()

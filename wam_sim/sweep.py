@@ -100,7 +100,7 @@ def listed(axes: Sequence[Axis]) -> list[tuple[Any, ...]]:
     """
     if len({len(axis.values) for axis in axes}) > 1:
         counts = ", ".join(f"{axis.name}: {len(axis.values)}" for axis in axes)
-        raise ValueError(f"a list needs as many values of each parameter; given are {counts}")
+        raise ValueError(f"a list needs the same number of values for each parameter; given: {counts}")
     return list(zip(*(axis.values for axis in axes), strict=True))
 
 
@@ -115,7 +115,9 @@ def drawn(axes: Sequence[Axis], count: int, seed: int) -> list[tuple[Any, ...]]:
     random = np.random.default_rng(seed)
     for name, values in axes:
         if len(values) != 2 or not all(isinstance(v, (int, float)) for v in values) or not values[0] < values[1]:
-            raise ValueError(f"{name} has the values {values}; a random sweep needs two numbers, low and high")
+            raise ValueError(
+                f"{name} has the values {values}; a random sweep needs two numbers, the lowest and the highest"
+            )
     return [
         tuple(
             float(low * (high / low) ** part) if low > 0.0 else float(low + (high - low) * part)

@@ -52,7 +52,7 @@ class LoopDesign(NamedTuple):
             f"margin: the gain is {part:.3g} times the largest linearly stable one, {verdict.margin:.4g}",
             f"largest safe error: {verdict.stable_error:.4g}; saturation of the loop: {self.loop.error_limit:.4g}",
             *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
-            f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
+            f"in figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
             ASSUMED,
         ]
         if undecided > verdict.stable_error:
@@ -77,7 +77,7 @@ MEANING = {
     Domain.I: "stable for every error",
     Domain.II: "friction stabilises it for small errors",
     Domain.BEYOND: "II or III, undecided: no error was shown to be safe, and not all were shown to be unsafe",
-    Domain.III: "no error was found for which every response comes to rest",
+    Domain.III: "unstable: at every error that was tried, some response does not come to rest",
 }
 
 

@@ -49,7 +49,7 @@ REFUSED = [
     ('sweep t.csv --vary seed={"a":1,"a":2}', "'a' is given twice"),
     ("sweep t.csv --vary seed=0.01:inf:3", "'0.01:inf:3' is no LOW:HIGH:N with 0 < LOW < HIGH"),
     (f"sweep t.csv --vary seed=0x{'f' * 5000}", "beyond every float"),
-    ("sweep t.csv --vary seed=", "write for example servo.gain=1,2"),
+    ("sweep t.csv --vary seed=", "write for example force_loop:force_gain=0.01,0.02"),
     ("sweep t.csv --vary seed=1:2:1000000000", "'1:2:1000000000' has 1000000000 values; at most 100000 sets"),
     ("sweep t.csv --vary seed=1 --vary seed=2", "--vary has seed 2 times"),
     ("sweep t.csv --vary scenario:script=a,b", "give the scenario with --scenario"),

@@ -232,8 +232,8 @@ IN_PLACE = "a value that you set, section '/**': "
         ({"arm.tool": [0.3, 0.0, 0.0]}, "by arm.covers.length it ends at (0.4064, 0, 0) m"),
         ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
         ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
-        ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "the tube ends at 0.5 m, arm.covers.end"),
-        ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "by arm.joints.offset of joint3, at (0, 0, -0.7)"),
+        ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "arm.covers.start and end reach up to 0.5 m"),
+        ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "allowed: (0, 0, 0), or (0, 0, -0.7), where joint3 begins"),
     ],
 )
 def test_values_that_do_not_fit_each_other_are_refused_with_the_others_to_change(
@@ -242,7 +242,7 @@ def test_values_that_do_not_fit_each_other_are_refused_with_the_others_to_change
     with pytest.raises(ParameterError) as refused:
         _ = WAM.with_values(values).shared
     assert message in str(refused.value)
-    assert ("another length of " in str(refused.value)) == next(iter(values)).startswith("arm.")
+    assert ("to change the length of " in str(refused.value)) == next(iter(values)).startswith("arm.")
 
 
 def test_values_at_their_bounds_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:

@@ -82,7 +82,7 @@ def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(
     reported, facts = feeder.facts()
     assert (reported.level, reported.message) == (DiagnosticStatus.OK, "domain I")
     assert float(facts["effective stiffness [N/m]"]) > 1000.0
-    assert float(facts["deadband that removes it [N]"]) > 0.0
+    assert float(facts["deadband that removes the limit cycle [N]"]) > 0.0
     refused = feeder.set(force_gain=[0.5], guard__mode="refuse")
     assert not refused.successful
     assert "times the largest linearly stable one" in refused.reason

@@ -148,7 +148,7 @@ NO_NODES = [
     ("wam_control.velocity.gravity_node:Gravity", "", "has no class 'Gravity'; did you mean 'GravityNode'\\? it has"),
     ("wam_control.velocity.gravity_node:f.<locals>.Own", "", "is inside a function; move it to the top of 'wam_con"),
     ("no_such_package:Class", "", "check that 'no_such_package' is installed or on PYTHONPATH"),
-    ("impedance:ImpedanceParameters", "", "is no node: name and parameters"),
+    ("impedance:ImpedanceParameters", "", "is no node: it lacks name and parameters"),
     ("broken_module:Any", "gain = 1 +\n", "node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"),
     ("my_loop:Mine", LOOP, "of the packaged node 'velocity_loop': give it another name; .*unknown"),
     # the faulty one, though another class of the module is configured

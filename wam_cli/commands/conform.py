@@ -82,7 +82,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Test a driver and print the rows of the contract as they are found; 1 where one is wrong."""
-    configuration = driver_alone(on_bus(configuration_of(given), given.bus))
+    configuration = configuration_of(given)
+    if (given.bus or given.dry_run) and "interface" not in configuration.sections.get("driver", {}):
+        raise ValueError(
+            "--bus and --dry-run are for a driver on a bus; give its configuration, for example --config "
+            "barrett-wam4-bus"
+        )
+    configuration = driver_alone(on_bus(configuration, given.bus))
     if given.dry_run:
         return _listen(configuration, given.dry_run)
     print(f"driver under test: {configuration.shared.nodes[0]}{', which already runs' if given.running else ''}")
@@ -138,10 +144,6 @@ def _serve(configuration: Configuration, version: int) -> None:
 
 def _listen(configuration: Configuration, seconds: float) -> int:
     """Print what is on the bus, and what the driver would send."""
-    if "interface" not in configuration.sections.get("driver", {}):
-        raise ValueError(
-            "--dry-run is for a driver on a bus; give its configuration, for example --config barrett-wam4-bus"
-        )
     own = configuration.node("driver", BusParameters)
     line = line_of(configuration.shared, own, time)
     print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)

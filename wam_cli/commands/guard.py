@@ -78,7 +78,7 @@ def _assess_configuration(configuration: Configuration) -> int:
 def _assess(given: argparse.Namespace) -> int:
     if missing := [name for name in PLANT if getattr(given, name) is None]:
         raise ValueError(
-            f"--{missing[0]} is missing, {PLANT[missing[0]]}; give all of --{', --'.join(PLANT)}; 'wam analyse' "
+            f"--{missing[0]} is missing ({PLANT[missing[0]]}); give all of --{', --'.join(PLANT)}; 'wam analyse' "
             "gives inertia, damping and friction of a recorded joint"
         )
     *plant, gain = (getattr(given, name) for name in PLANT)

@@ -98,7 +98,7 @@ def run(given: argparse.Namespace) -> int:
     failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
     failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
     doubts = f", {doubted} with a force that may be wrong (column reported)" if doubted else ""
-    print(f"{len(sets)} sets, {failed} failed{doubts}, in {given.file}")
+    print(f"{len(sets)} sets, {failed} failed{' (column failure)' * bool(failed)}{doubts}, in {given.file}")
     if failed == len(sets):
         print(f"every set failed; the first: {failures[0]}", file=sys.stderr)
     return int(failed == len(sets))
@@ -167,7 +167,8 @@ def _axis(text: str) -> Axis:
         reason = f": {getattr(error, 'problem', None) or error}"
     if not (name and equals and parsed):
         raise argparse.ArgumentTypeError(
-            f"{text[: FILES.longest_value]!r} is no NAME=VALUES{reason}; write for example servo.gain=1,2 or 1:2:5"
+            f"{text[: FILES.longest_value]!r} is no NAME=VALUES{reason}; write for example "
+            "force_loop:force_gain=0.01,0.02 or force_loop:force_gain=0.01:0.1:5"
         )
     return Axis(name, tuple(parsed))
 

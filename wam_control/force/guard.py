@@ -241,11 +241,11 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
         else UNKNOWN,
         "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
         "lowered": lowered or "nothing",
-        "worst": assessment.where,
+        "worst case": assessment.where,
         "effective stiffness [N/m]": f"{assessment.stiffness:.4g}",
         "limit cycle [N]": f"{cycle.peak_to_peak:.4g}",
         "period of the limit cycle [s]": f"{cycle.period:.4g}",
-        "deadband that removes it [N]": f"{cycle.deadband:.4g}",
+        "deadband that removes the limit cycle [N]": f"{cycle.deadband:.4g}",
         "verdict": assessment.reason or "accepted",
     }
     return Report(message, bool(assessment.reason) or is_scaled, facts)
