@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -240,21 +240,16 @@ def contacts_by_link(stamp: Times, signal: ForceSignal) -> list[tuple[int, int]]
 
 def _links(stamp: Times, signal: ForceSignal, begin: int, end: int) -> list[tuple[int, int]]:
     """Parts of a contact, each on another link; a change shorter than `bounce` is none."""
-    acting = begin + np.flatnonzero(signal.acts[begin:end])
-    names = signal.frame[acting]
     starts, link = [begin], ""
-    for first, after in _constant(names[1:] != names[:-1]):
-        if stamp[acting[after - 1]] - stamp[acting[first]] < TOUCH.bounce:
+    acting = begin + np.flatnonzero(signal.acts[begin:end])
+    for name, group in groupby(acting.tolist(), key=lambda row: str(signal.frame[row])):
+        rows = list(group)
+        if stamp[rows[-1]] - stamp[rows[0]] < TOUCH.bounce:
             continue
-        if link and names[first] != link:
-            starts.append(int(acting[first]))
-        link = names[first]
+        if link and name != link:
+            starts.append(rows[0])
+        link = name
     return list(pairwise([*starts, end]))
-
-
-def _constant(differs: Mask) -> Iterator[tuple[int, int]]:
-    """Rows [first, after) between changes; `differs`: whether each row but the first is another than that before."""
-    return pairwise([0, *(1 + np.flatnonzero(differs)).tolist(), len(differs) + 1])
 
 
 def cut_at(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +19,7 @@ from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
 
 
-class _Stream(NamedTuple):
-    """Stamps and receptions of a topic, ns, and its period by the parameters, s."""
-
-    name: str
-    stamp: Times
-    received: Times | None
-    expected: float
+_Stream = tuple[str, Times, Times | None, float]  # name, stamps and receptions, ns, period by the parameters, s
 
 
 def _own_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
@@ -38,7 +31,7 @@ def _own_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
             if timing is not None:
                 expected = timing.period if name.startswith("motor_") else timing.outer_period_ns / 1e9
             received = columns.log_time_ns if recording.mode == "realtime" else None
-            yield _Stream(name, columns.stamp_ns, received, expected)
+            yield name, columns.stamp_ns, received, expected
 
 
 def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
@@ -55,7 +48,7 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
             name += f" of {', '.join(one.name for one in those)}" if first.is_joint else ""
         stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
         is_table = np.array_equal(stamp, received)  # or messages without stamps
-        yield _Stream(name, stamp, None if is_table else received, math.nan)
+        yield name, stamp, None if is_table else received, math.nan
 
 
 def timing_section(recording: AnalysedRecording) -> Section:

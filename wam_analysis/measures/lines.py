@@ -32,8 +32,8 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     n = len(value)
     if n < CYCLE.window_samples or not np.ptp(value) > 0.0:
         return []
-    frequencies, amplitude = amplitudes(time, value)
-    power = amplitude**2
+    amplitude = 4.0 * np.abs(np.fft.rfft(_windowed(time, value)[0])) / n
+    power, spacing = amplitude**2, (n - 1) / (n * float(time[-1] - time[0]))
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     found: list[SpectralLine] = []
@@ -48,7 +48,7 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
             continue
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
-        frequency = (k + shift) * float(frequencies[1])
+        frequency = (k + shift) * spacing
         found.append(SpectralLine(frequency, amplitude_at(time, value, frequency)))
     return found
 
@@ -58,14 +58,6 @@ def amplitude_at(time: Numbers, value: Numbers, frequency: float) -> float:
     flat, window = _windowed(time, value)
     turns, width = np.exp(-2j * np.pi * frequency * (time - time[0])), np.gradient(time)
     return float(2.0 * np.abs(np.sum(flat * turns * width)) / np.sum(window * width))
-
-
-def amplitudes(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
-    """Frequencies, (f,), Hz, from 0 on, and the amplitude of a signal at each, of a Hann window; arguments as above."""
-    n = len(value)
-    frequency = np.arange(n // 2 + 1) * (n - 1) / (n * float(time[-1] - time[0]))
-    amplitude: Numbers = 4.0 * np.abs(np.fft.rfft(_windowed(time, value)[0])) / n
-    return frequency, amplitude
 
 
 def _windowed(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
