@@ -1,7 +1,7 @@
 """Section about the steps of a scenario: whether each did what was commanded, in answers."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from wam_analysis.findings.held_force import HeldForce
 from wam_analysis.held_messages import by_names, joint_angles, row_at
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, TOUCH
+from wam_analysis.traces import Traces
 from wam_analysis.unplanned_contact import LIMIT
 from wam_control.thresholds import MOTION
 from wam_description.event import Code
@@ -29,6 +30,10 @@ class VerdictResult(StrEnum):
     YES = "YES"
     NO = "NO"
     NOTHING = "NOT EVALUATED"
+
+
+def _yes(is_right: bool) -> VerdictResult:
+    return VerdictResult.YES if is_right else VerdictResult.NO
 
 
 class VerdictAnswer(NamedTuple):
@@ -78,34 +83,35 @@ def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
 
 def verdict(recording: AnalysedRecording) -> tuple[VerdictAnswer, ...]:
     """Whether postures, forces and contacts were right, each with its worst value, and what was too hard in motion."""
-    brief = _brief(recording)
-    has_contacts = bool(recording.contacts or recording.touched)
-    answers = (
-        *_posture_verdict(recording),
-        *([_force_verdict(recording.held, brief)] if recording.held or brief else []),
-        *_command_verdict(recording),
-        *([_link_verdict(recording), _position_verdict(recording)] if has_contacts else []),
-        *_false_verdict(recording),
-    )
+    return tuple(_answers(recording))
+
+
+def _answers(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
+    if errors := _posture_errors(recording):
+        yield _posture_verdict(errors)
+    if (brief := _brief(recording)) or recording.held:
+        yield _force_verdict(recording.held, brief)
+    yield from _command_verdict(recording)
+    if recording.contacts or recording.touched:
+        yield _link_verdict(recording)
+        yield _position_verdict(recording)
+    if not math.isnan(recording.traces.false_percent):
+        yield _false_verdict(recording.traces)
     hard, unknown = recording.unplanned
     question = "without a commanded force no contact above"
     if hard:
         worst = max(hard, key=lambda one: one.force)
-        return *answers, VerdictAnswer(f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{worst.force:.0f} N")
-    return *answers, *[VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")][: bool(unknown)]
+        yield VerdictAnswer(f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{worst.force:.0f} N")
+    elif unknown:
+        yield VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")
 
 
-def _posture_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
-    """Whether the arm came to each commanded posture; none without one."""
-    errors = _posture_errors(recording)
-    if not errors:
-        return []
+def _posture_verdict(errors: Mapping[str, float]) -> VerdictAnswer:
+    """Whether the arm came to each commanded posture."""
     missed = {name: error for name, error in errors.items() if error > MOTION.arrived}
-    worst = max(errors, key=lambda name: errors[name])
-    listed = missed or {worst: errors[worst]}
-    result = VerdictResult.NO if missed else VerdictResult.YES
-    shown = ", ".join(f"{error:.2g} rad in step {name}" for name, error in listed.items())
-    return [VerdictAnswer(f"posture within {MOTION.arrived:g} rad", result, shown)]
+    worst = max(errors, key=errors.__getitem__)
+    shown = ", ".join(f"{error:.2g} rad in step {name}" for name, error in (missed or {worst: errors[worst]}).items())
+    return VerdictAnswer(f"posture within {MOTION.arrived:g} rad", _yes(not missed), shown)
 
 
 def _posture_errors(recording: AnalysedRecording) -> dict[str, float]:
@@ -156,15 +162,13 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     return answer._replace(remark=f"{short} of {len(held) + brief} forces shorter than {STEADY:g} s" * bool(short))
 
 
-def _command_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
-    """Commands that were not carried out; none if there is none, and all could be assessed."""
+def _command_verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
+    """Commands that were not carried out; nothing if there is none, and all could be assessed."""
     counts = [f"{len(names)} {what}" for what, names in _outcomes(recording).items() if names]
     brief, why = recording.unassessed
-    if not counts and not brief:
-        return []
-    result = VerdictResult.NO if counts else VerdictResult.NOTHING
-    remark = f"{len(brief)} {why}" * bool(brief)
-    return [VerdictAnswer("commands carried out", result, ", ".join(counts), remark)]
+    if counts or brief:
+        result = VerdictResult.NO if counts else VerdictResult.NOTHING
+        yield VerdictAnswer("commands carried out", result, ", ".join(counts), f"{len(brief)} {why}" * bool(brief))
 
 
 def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
@@ -188,18 +192,14 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     return answer._replace(remark=f"not known for contact {', '.join(unknown)}" * bool(unknown))
 
 
-def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
-    """Whether a contact was estimated where none is; none where that is not known."""
-    traces = recording.traces
+def _false_verdict(traces: Traces) -> VerdictAnswer:
+    """Whether a contact was estimated where none is."""
     part, seconds = traces.false_percent, traces.false_seconds
-    if math.isnan(part):
-        return []
     question = f"false contact for at most {TOUCH.false_tolerance:g} % of the time without a contact"
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
-        return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]
-    is_right = part <= TOUCH.false_tolerance
-    return [VerdictAnswer(question, VerdictResult.YES if is_right else VerdictResult.NO, f"{part:.1f} %")]
+        return VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)
+    return VerdictAnswer(question, _yes(part <= TOUCH.false_tolerance), f"{part:.1f} %")
 
 
 def _answer(question: str, values: Sequence[float], allowed: float, shown: str) -> VerdictAnswer:
