@@ -18,9 +18,8 @@ from sample_messages import STORE, joint_state
 from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
 from wam_analysis.findings.charts import charts
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
-from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
-from wam_analysis.findings.prediction import largest_force, node_at
+from wam_analysis.findings.prediction import PressedPoint, guarded, largest_force, node_at
 from wam_analysis.findings.text import SCHEMA, json_text, text
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
@@ -277,10 +276,10 @@ def test_the_node_of_a_press_has_the_stiffness_and_friction_of_statics(moving: R
     arm = moving.configuration.shared.arm
     q, direction, position = [0.2, -1.1, 0.0, 0.7], np.array([0.0, -1.0, 0.0]), 0.25
     parameters = prediction_parameters(recorded_parameters(moving.bag, "/wam"))
-    node = node_at(parameters, arm, q, "outer_link", position, direction)
-    assert node is not None
     body = RigidBody(arm)
     axis = body.cover_pose(q, "outer_link").rotation @ direction
+    node = node_at(parameters, PressedPoint(body, q, "outer_link", position, axis))
+    assert node is not None
     step = 1e-6
     here = body.point(q, "outer_link", (position, 0.0, 0.0))
     there = [body.point(np.array(q) + step * unit, "outer_link", (position, 0.0, 0.0)) for unit in np.eye(4)]
@@ -303,15 +302,15 @@ def test_the_verdict_on_a_press_is_that_of_the_guard(moving: Recorded) -> None:
     assert recorded_set.timing is not None
     assert recorded_set.servo is not None
     q, position, direction = [0.0, -1.8, 0.0, 1.45], 0.28, np.array([0.0, -1.0, 0.0])
-    node = node_at(recorded_set, recorded_set.arm, q, "outer_link", position, direction)
-    assert node is not None
+    body = RigidBody(recorded_set.arm)
+    press = PressedPoint(body, q, "outer_link", position, body.cover_pose(q, "outer_link").rotation @ direction)
     for gain, words in ((0.015, "domain I, linearly stable "), (2.0, "NOT linearly stable")):
         own = replace(
             recorded_set.force_loop, force_gain=(gain,), contact_cover="outer_link", contact_position=position
         )
-        found = guarded(recorded_set._replace(force_loop=own), q, "outer_link", position, direction, math.nan)
+        found = guarded(recorded_set._replace(force_loop=own), press, math.nan)
         assert found is not None
-        assert words in sentence(found)
+        assert words in found.sentence
         loop = replace(own, guard=replace(own.guard, mode="refuse"))  # the force loop itself takes it or does not
         if gain < 1.0:
             taken = ForceLoop(recorded_set.arm, recorded_set.servo, loop, recorded_set.timing).assessment
@@ -324,7 +323,9 @@ def test_the_verdict_on_a_press_is_that_of_the_guard(moving: Recorded) -> None:
 
 def test_the_largest_force_of_the_testbed_is_peak_torque_over_the_lever() -> None:
     arm = Configuration.load(packaged("testbed")).shared.arm
-    found = largest_force(arm, [0.0], "link", 0.9144, np.array([0.0, -1.0, 0.0]))
+    body = RigidBody(arm)
+    axis = body.cover_pose([0.0], "link").rotation @ np.array([0.0, -1.0, 0.0])
+    found = largest_force(PressedPoint(body, [0.0], "link", 0.9144, axis))
     weight = 1.62155 * 9.80665 * 0.4572 / 14.0
     assert found.limited_by == "peak torque of motor1"
     assert found.force == pytest.approx((6.77908974 + weight) * 14.0 / 0.9144, rel=1e-6)

@@ -12,8 +12,7 @@ stick_slip             section about rest and motion of motors and joints
 force                  sections about force and stability
 swinging               whether a force settles, cycles or diverges
 contact                section about contacts, estimated and true
-prediction             the friction node at the contact and what chapter 5 predicts for it
-guarded                the stability guard on a recorded press
+prediction             the friction node at the contact, what chapter 5 and the stability guard predict for it
 transmission           motors, cables and joints on one time base, and their friction
 motion                 section about friction
 power                  section about efficiency and backdrivability

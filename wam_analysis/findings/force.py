@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
-from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
 from wam_analysis.measures.swings import Swings
@@ -174,7 +173,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     for one in held:
         theory = recording.theories[one.hold.name]
         text, fate = _fate(one)
-        found = [text, *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]
+        found = [text, *([theory.guarded.sentence] if theory.guarded is not None else [])]
         sentences += [sentence for sentence in found if sentence not in sentences]
         if fate is not Verdict.SETTLED:
             (wrong if fate is Verdict.DIVERGED else verdict).append(text)

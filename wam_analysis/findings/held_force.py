@@ -7,8 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_list import most
-from wam_analysis.findings.guarded import Guarded, guarded
-from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
+from wam_analysis.findings.prediction import (
+    Guarded,
+    LargestForce,
+    Predicted,
+    PressedPoint,
+    guarded,
+    largest_force,
+    node_at,
+    predict,
+)  # fmt: skip
 from wam_analysis.findings.swinging import Swinging, swinging
 from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.holds import Hold, measured_force
@@ -219,12 +227,11 @@ class Theory(NamedTuple):
 
     Attributes
     ----------
-    node, predicted, largest : by chapters 3 and 5.
+    predicted, largest : by chapters 3 and 5.
     guarded : by the stability guard.
     moved : size of the cycle of a motor as a motion of the contact along the force, m; NaN if it is not known.
     """
 
-    node: Node | None = None
     predicted: Predicted | None = None
     largest: LargestForce | None = None
     guarded: Guarded | None = None
@@ -239,26 +246,26 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
     if arm is None or poses is None or cover not in arm.covers.names:
         return Theory()
     q = poses[1][row_at(poses[0], (hold.begin + hold.end) // 2)].tolist()
-    link, direction = hold.cover or (cover if hold.frame == BASE else hold.frame), hold.force
-    if hold.frame != link:
-        body = RigidBody(arm)
-        rotation = np.eye(3) if hold.frame == BASE else body.cover_pose(q, hold.frame).rotation
-        direction = body.cover_pose(q, link).rotation.T @ rotation @ direction
-    node = node_at(parameters, arm, q, link, position, direction) if link == cover else None
-    largest = largest_force(arm, q, link, position, direction)
+    link, body = hold.cover or (cover if hold.frame == BASE else hold.frame), RigidBody(arm)
+    axis = hold.force / hold.commanded
+    if hold.frame != BASE:
+        axis = body.cover_pose(q, hold.frame).rotation @ axis
+    press = PressedPoint(body, q, link, position, axis)
+    node = node_at(parameters, press) if link == cover else None
+    largest = largest_force(press)
     if node is None:
         return Theory(largest=largest)
     loop, predicted = parameters.force_loop, None
     if loop is not None and loop.mode == "hybrid":
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
         predicted = predict(node, gain, proportional)
-    found = guarded(parameters, q, cover, position, direction, node.contact_stiffness)
+    found = guarded(parameters, press, node.contact_stiffness)
     moved, seen = math.nan, one.swinging
     if seen is not None and seen.swings.verdict is Verdict.LIMIT_CYCLE:
         turned = TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre
         ratio = abs(dict(zip(arm.motors.names, turned.tolist(), strict=True)).get(seen.shaft, 0.0))
         moved = seen.swings.peak_to_peak / ratio if ratio else math.nan
-    return Theory(node, predicted, largest, found, moved)
+    return Theory(predicted, largest, found, moved)
 
 
 def _along(gains: Sequence[float], force: Numbers) -> float:

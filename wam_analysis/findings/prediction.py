@@ -1,4 +1,4 @@
-"""Predictions for a press from the recorded parameters: the friction node at the contact.
+"""Predictions for a press from the recorded parameters: the friction node at the contact, the guard's domain.
 
 The arm is reduced to the node of figure 5.4 along the commanded force.  Joints move as the force loop moves
 them, dq/dx = J^T d/|J^T d|^2, which gives friction and damping by conservation of power; stiffness and inertia
@@ -7,17 +7,37 @@ are the apparent ones along d.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.findings.finding import shown
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers
+from wam_control.force.force_loop_parameters import force_law, task_of
+from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of
 from wam_description.arm import Arm
+from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_theory import linear_loop, regimes, stiction
+
+
+class PressedPoint(NamedTuple):
+    """Where an arm in a pose, q in rad, presses: on a cover, m from its start, along a unit axis of the base frame."""
+
+    body: RigidBody
+    q: Sequence[float]
+    cover: str
+    position: float
+    axis: Numbers
+
+    @property
+    def torque(self) -> Numbers:
+        """Of the joints per newton, (n,), m."""
+        return self.axis @ self.body.point_jacobian(self.q, self.cover, (self.position, 0.0, 0.0))
 
 
 class Node(NamedTuple):
@@ -59,23 +79,9 @@ class Predicted(NamedTuple):
     actuator_peak_to_peak: float
 
 
-def node_at(
-    recorded: PredictionParameters, arm: Arm, q: Sequence[float], cover: str, position: float, direction: Numbers
-) -> Node | None:
-    """The node at a contact; None if the arm cannot press there in this direction.
-
-    Parameters
-    ----------
-    recorded : for the surface and the velocity loops.
-    arm : the arm.
-    q : (n,), rad.
-    cover, position : of the contact, m.
-    direction : (3,), of the force, in the cover's frame.
-    """
-    body = RigidBody(arm)
-    size = float(np.linalg.norm(direction))
-    axis = body.cover_pose(q, cover).rotation @ (direction / size)
-    along = axis @ body.point_jacobian(q, cover, (position, 0.0, 0.0))
+def node_at(recorded: PredictionParameters, press: PressedPoint) -> Node | None:
+    """The node at a contact, with the recorded surface and velocity loops; None if the arm cannot press there so."""
+    body, arm, q, along = press.body, press.body.arm, press.q, press.torque
     square = float(along @ along)
     if square <= 1e-6:
         return None
@@ -86,7 +92,7 @@ def node_at(
     yields = servo is not None and all(gain > 0.0 for gain in servo.integral_gain)
     driven = float(along @ np.linalg.solve(at_joints(servo.integral_gain), along)) if servo and yields else 0.0
     moves = along / square
-    surface, damping = _surface(recorded, arm, cover, position)
+    surface, damping = _surface(recorded, arm, press.cover, press.position)
     return Node(
         transmission_stiffness=1.0 / gives,
         driven_stiffness=1.0 / (gives + driven),
@@ -144,19 +150,12 @@ class LargestForce(NamedTuple):
     limited_by: str
 
 
-def largest_force(arm: Arm, q: Sequence[float], cover: str, position: float, direction: Numbers) -> LargestForce:
-    """Largest controllable force by 3.2.1: peak torques of the motors and strength of the cables.
-
-    Parameters
-    ----------
-    arm, q, cover, position, direction : as in `node_at`; the weight of the arm is carried as well.
-    """
-    body = RigidBody(arm)
-    axis = body.cover_pose(q, cover).rotation @ (direction / float(np.linalg.norm(direction)))
-    torque = axis @ body.point_jacobian(q, cover, (position, 0.0, 0.0))
+def largest_force(press: PressedPoint) -> LargestForce:
+    """Largest controllable force by 3.2.1: peak torques of the motors, less the weight, and strength of the cables."""
+    body, arm = press.body, press.body.arm
     transmission = TransmissionMap.of(arm)
-    motor = np.array(transmission.motor_torques(torque.tolist()))  # per newton
-    carried = np.array(transmission.motor_torques(body.gravity_torque(q).tolist()))
+    motor = np.array(transmission.motor_torques(press.torque.tolist()))  # per newton
+    carried = np.array(transmission.motor_torques(body.gravity_torque(press.q).tolist()))
     best = LargestForce(math.inf, "nothing")
     for i, name in enumerate(arm.motors.names):
         if abs(motor[i]) < 1e-9:
@@ -171,3 +170,55 @@ def largest_force(arm: Arm, q: Sequence[float], cover: str, position: float, dir
             if room / abs(motor[i]) < best.force:
                 best = LargestForce(max(room, 0.0) / abs(float(motor[i])), what)
     return best
+
+
+class Guarded(NamedTuple):
+    """The guard's result for the sampled loop with its velocity loops, see `wam_control.force.sampled_loop`.
+
+    Attributes
+    ----------
+    assessment : at this contact.
+    surface : its stiffness, N/m.
+    posture : of this contact, in words.
+    """
+
+    assessment: GuardAssessment
+    surface: float
+    posture: str
+
+    @property
+    def sentence(self) -> str:
+        """The result as a sentence."""
+        domain, scale = self.assessment.domain, self.assessment.scale
+        stable = "linearly stable with up to" if scale >= 1.0 else "NOT linearly stable with more than"
+        return (
+            f"Stability guard (sampled loop with its velocity loops, contact of {shown(self.surface)} N/m, "
+            f"{self.posture}): domain {domain}, {stable} {shown(scale)} times these gains."
+        )
+
+
+def guarded(recorded: PredictionParameters, press: PressedPoint, surface: float) -> Guarded | None:
+    """Evaluate the recorded gains of the force loop; None if the bag has too few parameters.
+
+    Parameters
+    ----------
+    surface : stiffness of what is pressed, N/m; NaN takes that of the guard's parameters.
+    """
+    arm, loop, timing, servo = recorded.arm, recorded.force_loop, recorded.timing, recorded.servo
+    if arm is None or loop is None or timing is None or servo is None or loop.mode != "hybrid":
+        return None
+    parameters = loop.guard
+    if math.isfinite(surface):
+        parameters = replace(parameters, contact_stiffness=surface)
+    x, y, z = press.axis.tolist()
+    law = force_law(loop)
+    try:
+        guard = StabilityGuard(arm, servo, timing, parameters, loop.sensing)
+    except ParameterError:
+        return None
+    contact = GuardedContact(tuple(press.q), press.cover, press.position, 0.0, (x, y, z), HOLD.typical_press)
+    touches = guard.with_lever(contact)
+    if not touches or not any((*law.gain, *law.proportional_gain)):
+        return None
+    posture = posture_of(touches[0]._replace(q=tuple(np.round(press.q, 3))))
+    return Guarded(guard.assess(task_of(loop), touches), parameters.contact_stiffness, posture)
