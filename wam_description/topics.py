@@ -72,7 +72,7 @@ FORCE_AXIS: Final = {  # columns of the table, and what they mean
     "force_sd": "standard deviation of the measured force, N; infinite if the force has no lever",
     "lever": "lever arm: norm of the joint torques divided by the force, m",
     "apparent_mass": "measured force divided by the acceleration along it, in free motion, kg",
-    "speed_fraction": "velocity along the force divided by the commanded one, 0 to 1",
+    "speed_fraction": "velocity along the force divided by the commanded velocity, 0 to 1",
     "position": "contact position along the cover, m",
     "position_sd": "its standard deviation, m",
 }
