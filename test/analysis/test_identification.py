@@ -361,7 +361,7 @@ def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_h
     assert re.search(impossible, printed.err)
     assert "warning: the simulator pushed the arm in 50 % of the recording" in printed.out
     first, *_ = printed.out.splitlines()  # before the report
-    assert first.startswith("NOT POSSIBLE: ")
+    assert first.startswith("NOT A POSSIBLE MODEL: ")
     assert re.search(impossible, first)
 
 

@@ -80,7 +80,7 @@ def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(
         lambda: bool(seen) and {"verdict": "accepted", "peers": "connected"}.items() <= feeder.facts()[1].items()
     )
     reported, facts = feeder.facts()
-    assert (reported.level, reported.message) == (DiagnosticStatus.OK, "domain I")
+    assert (reported.level, reported.message) == (DiagnosticStatus.OK, "stable, domain I")
     assert float(facts["effective stiffness [N/m]"]) > 1000.0
     assert float(facts["deadband that removes the limit cycle [N]"]) > 0.0
     refused = feeder.set(force_gain=[0.5], guard__mode="refuse")

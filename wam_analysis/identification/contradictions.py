@@ -24,7 +24,10 @@ class Mistake(StrEnum):
     """What is wrong with a recording, in words."""
 
     # all torques are larger or smaller than those of the configured arm
-    SCALED = "all torques are {size:.2g} times those of the configuration: amperes, the other sign, or a load?"
+    SCALED = (
+        "all torques are {size:.2g} times those of the configuration: is the effort in A, its sign wrong, or is there "
+        "a load?"
+    )
     # those of one motor are, or have the other sign
     SCALED_MOTOR = (
         "the torques of {about} are {size:.2g} times those of the configuration: sign, unit or torque constant?"

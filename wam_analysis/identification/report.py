@@ -17,15 +17,15 @@ UNITS = {
 STATIC = "motors.static_"
 BY_SHAPE = "by the curve"
 NOTES = f"""'In combination': identified only together with other parameters.
-'{BY_SHAPE}': static friction is where the fitted friction curve ends at rest, with the error of that curve. Stiction
+'{BY_SHAPE}': static friction is the value of the fitted friction curve at rest, with the error of that curve. Stiction
 that acts only below {IDENTIFY.slowest_motor:g} rad/s of a motor is not in it; `wam analyse` shows breakaway torques.
-The inertia of a rotor may err by a quarter, up to twice its standard error, in either direction: see docs/identify.md.
+The inertia of a rotor may be wrong by a quarter, up to twice its standard error: see docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: it gives the same torques as friction that differs between the
 directions, in motion, at rest and with a dither. The table shows the offset that would explain the whole difference.
 The model has the sum of friction and offset, in coulomb_positive and coulomb_negative.
-'not in the covariance': standard deviation of each motor's torque that follows from errors of parameters that the
-covariance for the contact estimator cannot express."""
+'not in the covariance': the part of the torque error, one standard deviation, that the covariance for the contact
+estimator cannot express."""
 
 
 def report(shared: Shared, found: Identification, label: str) -> str:
@@ -48,7 +48,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     for i, name in enumerate(shared.arm.motors.names):
         numbers = [f"{offset[i]:.4g}", f"{offset_sd[i]:.4g}", "0"]
         rows.append([f"motors.torque_offset.{name}", *numbers, "N m", "not from this recording"])
-    head = [["parameter", "value", "standard error", "previous", "unit", "identifiable"]]
+    head = [["parameter", "value", "standard error", "present value", "unit", "identifiable"]]
     lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
     parts = (found.before, found.residual, found.held_out)
     lines += plain(
@@ -56,9 +56,9 @@ def report(shared: Shared, found: Identification, label: str) -> str:
             [
                 "motor",
                 "motion",
-                "unexplained by the present model",
+                "torque unexplained by the present model",
                 "by the identified model",
-                "held out",
+                "by it, in motion not used for the fit",
                 "not in the covariance",
             ]
         ],
@@ -84,8 +84,8 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
             )
         if found.held_out[i] > IDENTIFY.unexplained * found.residual[i] + 1e-4:
             yield (
-                f"{name}: motion held out of the fit is predicted to {1e3 * found.held_out[i]:.3g} mN m, the rest to "
-                f"{1e3 * found.residual[i]:.3g} mN m: too little motion for all parameters"
+                f"{name}: in motion not used for the fit, {1e3 * found.held_out[i]:.3g} mN m remain unexplained, in "
+                f"the rest {1e3 * found.residual[i]:.3g} mN m; record more motion"
             )
         share = found.residual[i] / max(level[:, i].mean(), 1e-9)
         if share > IDENTIFY.remaining:

@@ -19,7 +19,7 @@ from wam_studies.page import kept_rows, section_of, with_section
 from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
 from wam_studies.thesis.evaluation import evaluate, text
 from wam_studies.thesis.rows import PAGE_HEAD, Result, summary
-from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
+from wam_studies.thesis.samples import FOLDER, INDEX, LIMIT, Entry, check, make, read_index, write_index
 from wam_studies.thesis.sweeping import SweptRun, record_run
 
 PICTURE = "result.png"
@@ -145,8 +145,8 @@ def _samples(given: argparse.Namespace) -> int:
     for experiment in chosen:
         if experiment.name not in entries:
             wrong.append(
-                f"{folder} lists no sample of {experiment.name}; make it: 'wam experiment {experiment.name} --samples "
-                "make'"
+                f"{folder}/{INDEX} has no sample of {experiment.name}; give its directory with --directory, or record "
+                f"it: wam experiment {experiment.name} --samples make"
             )
             continue
         entry = entries[experiment.name]

@@ -20,7 +20,7 @@ PLANT = {  # option: what it is
     "gain": "integral gain G_I, rad/s per N m or m/s per N",
 }
 SERVO = "velocity_loop"
-WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered")  # facts of a running arm
+LEFT_OUT = ("margin here", "margin here, assessed", "gain factor", "lowered", "domain", "verdict")  # see the message
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,9 +67,9 @@ def run(given: argparse.Namespace) -> int:
 def _assess_configuration(configuration: Configuration) -> int:
     require_parameters(configuration)
     report = guard(configuration)
-    facts = {name: value for name, value in report.facts.items() if name not in WHILE_IT_RUNS}
+    facts = {name: value for name, value in report.facts.items() if name not in LEFT_OUT}
     width = max(map(len, facts))
-    if SERVO not in configuration.shared.nodes and "domain" in facts:
+    if SERVO not in configuration.shared.nodes and "domain" in report.facts:
         print(f"computed for the packaged {SERVO}; the guard does not know the one that this configuration runs")
     print("\n".join([report.message, *(f"  {name:{width}}  {value}" for name, value in facts.items())]))
     return int(report.is_warning)

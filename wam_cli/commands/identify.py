@@ -92,7 +92,7 @@ def run(given: argparse.Namespace) -> int:
     values = model_values(shared, found, bag.name) | estimator_values(configuration)
     impossible = impossibility(configuration, values, str(bag))
     if impossible:
-        print(f"NOT POSSIBLE: {impossible}\n")  # before a report of many lines, and as the last line
+        print(f"NOT A POSSIBLE MODEL: {impossible}\n")  # before a report of many lines, and as the last line
     print(report(shared, found, str(bag)), flush=True)
     _warn(run_in_bag, against)
     if impossible:
@@ -131,8 +131,8 @@ def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
     there = tuple(run.parameters.node("driver").get("arm.joint_from_motor", shared.arm.joint_from_motor))
     if there != shared.arm.joint_from_motor:
         raise ValueError(
-            f"{run.bag.path} is of an arm with joint_from_motor {list(there)}; the configuration has "
-            f"{list(shared.arm.joint_from_motor)}; give the configuration of that arm with --config"
+            f"{run.bag.path} was recorded with another arm: its joint_from_motor is {list(there)}, in the "
+            f"configuration it is {list(shared.arm.joint_from_motor)}; give the configuration of that arm with --config"
         )
 
 

@@ -196,7 +196,7 @@ class ForceWatch:
         after, back = (soon, late) if self._has_settled else (late, soon)
         if self._off.step(not is_reached, after, back, dt):
             values: dict[str, Value] = {"measured": known.force, "desired": desired, "time": after, "unit": _unit(axis)}
-            values["has_touched"] = float(self.touch.has_been)
+            values["has_touched"] = float(self.touch.is_there)
             cause = "force_strays" if self._has_settled else "force_off"
             events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
         self._has_settled = self._has_settled or (is_reached and not self._off.is_on)

@@ -225,11 +225,11 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
     if assessment is None or watch is None:
         return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
     here, is_scaled = min(watch.scale, assessment.scale), watch.factor < 1.0 and mode != "warn"
-    message = f"domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
+    message = f"stable, domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
     if assessment.reason:
         message = f"not stable: {assessment.reason}"
     elif is_scaled:
-        message += f"; gains times {watch.factor:.3g} in this pose, in which the contact is stiffer"
+        message += f"; in this pose the contact is stiffer, so the gains are multiplied by {watch.factor:.3g}"
     cycle = assessment.cycle
     facts = {
         "guard.mode": mode,
