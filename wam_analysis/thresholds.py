@@ -50,7 +50,7 @@ class ShaftThresholds:
     apart: float = 0.1
     limited: float = 0.1  # of the time, in which an effort is exactly at its bounds
     agree: float = 0.1  # by which a recorded velocity may differ from the rate of the position
-    late: float = 0.02  # of a velocity, by which a delay changes it: less is not seen in the friction
+    late: float = 0.02  # of a velocity, by which a delay or a scale changes it: less is not seen in the friction
     way: float = 1.0  # s, in which they are compared: longer than a velocity is late, shorter than an encoder slips
     least_work: float = 1e-3  # J below which no efficiency is given
     release: int = 200_000_000  # ns after the brakes were released
@@ -227,6 +227,8 @@ class StreamThresholds:
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
+    steps: int = 64  # from stamp to stamp, from which a rate is known
+    changes: float = 1.5  # periods: a step that is longer lacks a message, and a period that is longer is another one
     evenly: float = 0.9  # of the changes of a signal: so many are as far apart, if it is held over between them
     counts: float = 2.0  # smallest changes: those of an encoder are mostly smaller
     turns: tuple[float, ...] = (
@@ -243,6 +245,7 @@ class StreamThresholds:
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
     loud: float = 1e3  # roundings of a number: smaller changes are none
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
+    averaged: float = 0.2  # s, over which a recorded velocity is compared with the rate of the position
     widest: float = 0.03  # s about each sample that such a velocity is taken from
 
 

@@ -136,7 +136,7 @@ def coarse() -> list[Case]:
 
 def twice() -> list[Case]:
     sent = one("/joint_states", 100.0, 0.7, 0.5)
-    again = [s._replace(received=s.received + 0.0004) for s in sent]
+    again = [s._replace(received=s.received + 0.003) for s in sent]
     expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0}
     # at 0.4 of the computer's time; it stops for 12 s, and its last message is repeated
     slow = [s._replace(stamp=s.stamp - 1.7e9, received=s.stamp / 0.4 + 12.0 * (s.stamp > 13.0)) for s in sent]
@@ -158,9 +158,11 @@ def by_chance() -> list[Case]:
     some = [s._replace(fields=none if lacks else fields)
             for s, fields, lacks in zip(sent, both, lacking, strict=True)]  # fmt: skip
     expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0, "/joint_states: missed periods": 0.0}
+    told = f"in only {len(sent) - np.count_nonzero(lacking)} of {len(sent)}"
     return [
         Case("late", by_rosbags, late, expected),
-        Case("no numbers", sqlite, some, expected, f"in only {len(sent) - np.count_nonzero(lacking)} of {len(sent)}"),
+        Case("no numbers", sqlite, some, expected, told),
+        Case("no velocity, no numbers", ros1, without(some, lambda _: True, "velocity"), expected, told),
     ]
 
 
@@ -211,7 +213,9 @@ def of_ros2_control() -> list[Case]:
         Case("old controller", sqlite, controller("desired", "actual"), expected, "", NOTHING, followed),
         Case("interfaces", by_rosbags, interfaces, expected, "", NOTHING, ("b: never moved.",)),
         Case("beside joint states", by_rosbags, beside, expected | {"/joint_states: period": 20.0}),
-    ]
+        Case("both", ros1, one("/joint_states", 50.0, 0.7, 0.5) + controller("desired", "actual"), {}, "", NOTHING,
+             ("/joint_states a repeats at 0.7 Hz, 1 rad peak to peak, from 0.0 to 30.0 s (confidence 1.00), as it",)),
+    ]  # fmt: skip
 
 
 def called_as_commands() -> list[Case]:
@@ -258,19 +262,13 @@ def still() -> list[Case]:
         return Case(f"{count:g}, {noise:g}", write, sent, FRICTION, "", NOTHING, ("b: never moved.",))
 
     return [
-        Case(
-            "a cycle of four counts",
-            by_rosbags,
-            in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
-            {"a: frequency": 0.3},
-            "",
-            NOTHING,
-            ("a: moved by 0.00614 rad, more slowly than the noise of its velocity.",),
-        ),
+        Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
+             {"a: frequency": 0.3}, "", NOTHING,
+             ("a: moved by 0.00614 rad, more slowly than the noise of its velocity.",)),
         with_flicker(by_rosbags, 1, 1e-4, 0.0),
         with_flicker(sqlite, 2, 1e-3, 1e-4),
         with_flicker(ros1, 3, 2e-5, 1e-3),
-    ]
+    ]  # fmt: skip
 
 
 def brief_rests() -> list[Case]:
@@ -328,11 +326,15 @@ def contradictions() -> list[Case]:
     zero = {"velocity": [0.0], "position": [0.0], "effort": [0.0]}
     sent = one("/joint_states", 100.0, 0.7, 0.5)
     seconds = [[s._replace(fields=s.fields | zero, stamp=s.stamp + 0.0042) for s in sent[::every]] for every in (1, 10)]
-    both = [
-        Case(f"{len(some)} of a second", sqlite, sent + some, {}, "took turns; the topic is not") for some in seconds
-    ]
+    told = "took turns; the topic is not"
+    both = [Case(f"{len(some)} of a second", sqlite, sent + some, {}, told) for some in seconds]
     others = [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), scaled(0.85, sqlite, 200.0), *both]
-    scales = [*others, scaled(57.3, by_rosbags, 100.0), scaled(-1.0, sqlite, 200.0), scaled(0.105, ros1, 50.0)]
+    scales = [
+        *others,
+        scaled(57.3, by_rosbags, 100.0),
+        scaled(-1.0, sqlite, 200.0),
+        *(scaled(by, ros1, 50.0) for by in (0.105, 1.05)),
+    ]
     return [*scales, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0)]
 
 

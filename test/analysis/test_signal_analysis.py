@@ -314,6 +314,8 @@ def test_late_messages_are_not_counted_as_missing(jitter, lost):
     stamp = np.rint(1e7 * (np.arange(4000) + jitter * draws.uniform(-1.0, 1.0, 4000))[kept]).astype(np.int64)
     inner = np.diff(np.flatnonzero(kept)) - 1
     assert stamp_timing(stamp, None).missed == inner.sum()
+    slower = np.append(stamp, stamp[-1] + 60_000_000 * np.arange(1, 400))
+    assert 0.95 * inner.sum() <= stamp_timing(slower, None).missed <= inner.sum()
 
 
 # swings

@@ -1,13 +1,13 @@
 """Section about friction and inertia of the joints of another robot, from their effort."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import rest_speed
-from wam_analysis.foreign.sources import Piece, Source, pieces, rests, velocity_fit
+from wam_analysis.foreign.sources import Piece, Source, pieces, rests, velocity_fit, ways
 from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -112,15 +112,14 @@ def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
 
     A velocity that is late differs only as far as it changes meanwhile.
     """
-    time, position, velocity = piece.time, piece.values["position"], piece.values["velocity"]
+    time, velocity = piece.time, piece.values["velocity"]
     period = float(time[1] - time[0])
     width = round(SHAFT.way / period)
     if len(time) <= width:
         return None
-    way, path = (
-        np.concatenate(([0.0], np.cumsum(0.5 * period * (v[1:] + v[:-1])))) for v in (velocity, np.abs(velocity))
-    )
-    moved, by, far, change = (x[width:] - x[:-width] for x in (position, way, path, velocity))
+    moved, by = ways(piece, width)
+    path = np.concatenate(([0.0], np.cumsum(np.abs(0.5 * period * (velocity[1:] + velocity[:-1])))))
+    far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
     allowed = SHAFT.agree * far + SHAFT.longest_effort_lag * np.abs(change) + SHAFT.joint_rest * SHAFT.way
     excess = np.abs(moved - by) - allowed - SHAFT.noisy * piece.noise["position"]
     if np.sum(excess > 0.0) < width // 2:
@@ -167,47 +166,33 @@ def friction(source: Source) -> tuple[Friction, float]:
     has_weight = "position" in joined and source.units["position"] == "rad"
     load = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])] if has_weight else [0.0 * velocity])
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
-    trial = _Trial(velocity, joined["effort"], load, rest, window, period)
+    loads = np.column_stack([velocity * np.abs(velocity), load])  # with a drag
+    time = period * np.arange(len(velocity), dtype=np.float64)
+
+    def fit(shift: int) -> Friction:
+        """Friction with the effort of `shift` samples later."""
+        return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, load=loads)
+
     width = round(window / period)
     own, noise = _own_acceleration(velocity, sd, load, rest, width, period)
     one_frequency = has_weight and own < SHAFT.apart
-    found, shift = (trial.fit(0), 0) if one_frequency else trial.best()
+    found, shift = (fit(0), 0) if one_frequency else _best(fit, math.ceil(SHAFT.longest_effort_lag / period))
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 
 
-class _Trial(NamedTuple):
-    """What friction is identified from; fits with the effort shifted."""
-
-    velocity: Numbers
-    effort: Numbers
-    load: Numbers
-    rest: float
-    window: float
-    period: float
-
-    def fit(self, shift: int) -> Friction:
-        """Friction with the effort of `shift` samples later."""
-        effort = np.roll(self.effort, -shift)
-        time = self.period * np.arange(len(effort), dtype=np.float64)
-        drag = self.velocity * np.abs(self.velocity)
-        return identify_friction(
-            time, self.velocity, effort, self.rest, self.window, load=np.column_stack([drag, self.load])
-        )
-
-    def best(self) -> tuple[Friction, int]:
-        """The fit with the shift of the effort, samples, that leaves least unexplained; none unless that is much."""
-        most = math.ceil(SHAFT.longest_effort_lag / self.period)
-        step, best = max(1, most // 4), 0
-        fits = {0: self.fit(0)}
-        while step:
-            for shift in (best - step, best + step):
-                if abs(shift) <= most and shift not in fits:
-                    fits[shift] = self.fit(shift)
-            nearest = min(fits, key=lambda shift: fits[shift].residual)
-            step, best = (step if nearest != best and step > 1 else step // 2), nearest
-        best = best if fits[best].residual < SHAFT.much_better * fits[0].residual else 0
-        return fits[best], best
+def _best(fit: Callable[[int], Friction], most: int) -> tuple[Friction, int]:
+    """The fit with the shift of the effort, samples, that leaves least unexplained; none unless that is much."""
+    step, best = max(1, most // 4), 0
+    fits = {0: fit(0)}
+    while step:
+        for shift in (best - step, best + step):
+            if abs(shift) <= most and shift not in fits:
+                fits[shift] = fit(shift)
+        nearest = min(fits, key=lambda shift: fits[shift].residual)
+        step, best = (step if nearest != best and step > 1 else step // 2), nearest
+    best = best if fits[best].residual < SHAFT.much_better * fits[0].residual else 0
+    return fits[best], best
 
 
 def _own_acceleration(

@@ -11,6 +11,7 @@ from wam_analysis.held_messages import row_at
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD
+from wam_bag.arrays import Numbers
 
 FORCE = ("force.x", "force.y", "force.z")
 
@@ -48,36 +49,37 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     stretches = pieces(measured)
     rows = row_at(command.time, measured.time[known])
     got = np.column_stack([measured.values[axis][known] for axis in axes])
-    sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (desired[rows] - desired[rows].mean(axis=0))))) or 1.0
+    wanted = desired[rows]
+    together = (got - got.mean(axis=0)) * (wanted - wanted.mean(axis=0)), got * wanted  # or both are constant
+    sign = next(filter(None, (np.sign(float(np.sum(one))) for one in together)), 1.0)
     found, arrives = [], command.arrives
-    for last, row, until in zip([0, *begins[:-1]], begins, ends, strict=True):
-        begin = float(command.time[row])
+    for last, row, until in zip([0.0 * desired[0], *desired[begins[:-1]]], begins, ends, strict=True):
+        begin = max(float(command.time[row]), float(measured.time[0]))
         end = min(until, command.leaves(begin), measured.leaves(begin))
-        change = desired[row] - desired[last]
+        change = desired[row] - last
         size = float(np.linalg.norm(change))
         if size <= HOLD.equal_force or arrives[row] or end - begin < HOLD.shortest:
             continue
         way = change / size
         for piece in stretches:
             value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
-            before = (piece.time < begin) & (piece.time >= begin - HOLD.before)
+            before = value[(piece.time < begin) & (piece.time >= begin - HOLD.before)]
             after = (piece.time >= begin) & (piece.time < end)
-            if not np.any(before) or np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
+            is_known = len(before) or begin == measured.time[0]
+            if not is_known or np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
-            try:
-                response = step_response(
-                    piece.time[after] - begin,
-                    value[after],
-                    float(np.mean(value[before])),
-                    HOLD.steady * (end - begin),
-                    HOLD.band,
-                )
-            except ValueError:
-                continue
-            found.append(
-                ForceStep(measured.label, begin, float(desired[last] @ way), float(desired[row] @ way), response)
-            )
+            response = _response(piece.time[after] - begin, value[after], before, size)
+            found.append(ForceStep(measured.label, begin, float(last @ way), float(desired[row] @ way), response))
     return found
+
+
+def _response(time: Numbers, value: Numbers, before: Numbers, size: float) -> StepResponse:
+    """Of a force to a step of a size; the steady state alone where it was reached before the step or the recording."""
+    steady = HOLD.steady * float(time[-1])
+    tail = value[time >= time[-1] - steady]
+    if not len(before) or abs(np.mean(tail) - np.mean(before)) < HOLD.loud * size:
+        return StepResponse(float(np.mean(tail)), math.nan, math.nan, math.nan, float(np.ptp(tail)) / 2.0, math.nan)
+    return step_response(time, value, float(np.mean(before)), steady, HOLD.band)
 
 
 def step_section(recording: AnalysedRecording) -> Section:
@@ -100,7 +102,8 @@ def step_section(recording: AnalysedRecording) -> Section:
     for step in steps:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
-        settled = "" if math.isfinite(response.settling) else ", which did not settle to 5 %"
+        settled = ", which did not settle to 5 %" * math.isinf(response.settling)
+        settled += ", without a rise in the recording" * math.isnan(response.settling)
         sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
         findings += [
             Finding(f"{name}: force in the steady state", "N", abs(response.final), abs(step.commanded)),

@@ -37,6 +37,8 @@ def stick_section(recording: AnalysedRecording) -> Section:
         if recording.is_foreign and found.stuck and 0 < found.slips == len(found.begins):  # ours have the arm's time
             begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.begins]] + ["..."] * (found.slips > LAYOUT.begins)
             sentence += f" (from {', '.join(begins)} s)"
+        if recording.is_foreign and found.stuck and found.slips and found.slowest:
+            sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
             verdict.append(f"{sentence}.")
@@ -56,6 +58,7 @@ class Sticking(NamedTuple):
     begins : when each motion began, s; none of a motion back and forth.
     shortest : rest that is counted, s.
     is_turning : whether it is that of a motion back and forth.
+    slowest : speed in rad/s or m/s up to which it is at rest, where the noise hides slower motions; else 0.
     """
 
     stuck: float
@@ -64,6 +67,7 @@ class Sticking(NamedTuple):
     begins: tuple[float, ...] = ()
     shortest: float = 0.0
     is_turning: bool = False
+    slowest: float = 0.0
 
     @property
     def words(self) -> str:
@@ -81,11 +85,12 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if rests(source):
         return Sticking(1.0, 0, math.nan)
     still = slips = total = disobeyed = 0
-    shortest, is_turning = 0.0, False
+    shortest, slowest, is_turning = 0.0, 0.0, False
     begins: list[float] = []
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
         rest = rest_speed(piece, least)
+        slowest = max(slowest, rest * (rest > least))
         period = float(piece.time[1] - piece.time[0])
         least_rows = max(1, round(SHAFT.shortest_phase / period))
         phases = _still(piece, stick_slip_phases(piece.values["velocity"], rest, least_rows), least)
@@ -110,7 +115,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if not total:
         return None
     unmet = disobeyed / still if command is not None and still else math.nan
-    return Sticking(still / total, slips, unmet, tuple(begins), shortest, is_turning)
+    return Sticking(still / total, slips, unmet, tuple(begins), shortest, is_turning, slowest)
 
 
 def hidden_motion(source: Source) -> float:

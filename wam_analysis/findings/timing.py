@@ -69,6 +69,9 @@ def timing_section(recording: AnalysedRecording) -> Section:
                 Finding(f"{name}: reception jitter", "ms", 1e3 * found.jitter, note="standard deviation"),
                 Finding(f"{name}: longest gap between receptions", "s", found.worst),
             ]
+        if found.slowest > STREAM.changes * found.period:
+            longer = shown(found.slowest, "s")
+            wrong.append(f"{name}: the period changes, from {shown(found.period, 's')} to {longer}.")
         if found.missed:
             gap = shown(found.longest_gap, "s")
             wrong.append(f"{name}: {found.missed} missing, the longest gap {gap}.")

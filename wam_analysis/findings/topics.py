@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Section, counted, shown, times
-from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
+from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces, velocity_fit
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
+from wam_analysis.thresholds import SHAFT
 from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
 
@@ -31,7 +32,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-        wrong += _too_large(name, columns, given)
+        wrong += _too_large(name, columns, given, [one for one in found if one.topic == name])
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
@@ -56,12 +57,13 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
 
 
-def _too_large(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
-    """Which values may be in another unit than that of ROS."""
+def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Source]) -> Iterator[str]:
+    """Which values may be in another unit than that of ROS; a velocity that is the rate of a position is in none."""
     for quantity, most in UNUSUAL.items():
         values = np.abs(getattr(columns, quantity, np.empty(0)))
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
-        if largest > most and quantity not in given.units:
+        is_rate = quantity == "velocity" and any(abs(velocity_fit(one)[0] - 1.0) <= SHAFT.agree for one in found)
+        if largest > most and quantity not in given.units and not is_rate:
             taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, if read in the unit of ROS"
             smaller: dict[tuple[float, str], str] = {}  # each in its first spelling
             for unit, one in UNITS.items():
@@ -96,6 +98,7 @@ DONE_TO = {
     Treatment.HELD: "{quantity} only repeated in {number} of {of} messages; the others are used",
     Treatment.UNFILLED: "the {quantity} is 0 in every message although the position moves; the rate of that is used",
     Treatment.LATE: "the {quantity} is about {size}, as by a filter; the rate of the position is used",
+    Treatment.SCALED: "the {quantity} is {factor:.3g} times the rate of the position; that rate is used",
     Treatment.SPARSE: "{quantity} in only {share} of {of} messages",
 }
 
@@ -117,6 +120,7 @@ def _treated(found: Sequence[Source]) -> list[str]:
             number=treated.number,
             of=treated.of,
             size=shown(abs(treated.size), those[0].units.get(quantities[0], "s")),
+            factor=treated.size,
             times=times(treated.number),
             share=treated.of - treated.number,
         )

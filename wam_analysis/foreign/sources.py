@@ -7,6 +7,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.reading import COMMAND
@@ -31,6 +32,7 @@ class Treatment(StrEnum):
     HELD = "values held over"  # from the message before: were left out
     UNFILLED = "zeros"  # although the joint moves: were left out
     LATE = "a filtered velocity"  # was left out
+    SCALED = "a velocity of another scale"  # was left out
     SPARSE = "messages without"  # the others were used
 
 
@@ -41,14 +43,15 @@ class Treated(NamedTuple):
     ----------
     what : the kind.
     quantity : of which, '' for the messages.
-    number, of : how many, of all.
-    size : of a wrap, or the largest of the jumps, in the unit of the quantity; s, to which stamps are rounded.
+    number, of : how many, of all; 0 where it is the whole.
+    size : of a wrap, or the largest of the jumps, in the unit of the quantity; s, to which stamps are rounded; of a
+        velocity, per rate of the position.
     """
 
     what: Treatment
     quantity: str
-    number: int
-    of: int
+    number: int = 0
+    of: int = 0
     size: float = math.nan
 
 
@@ -198,10 +201,13 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     same = steps == 0
     number, of = int(np.sum(same)), len(rows)
     numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
-    twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
+    changed = np.any(numbers[1:] != numbers[:-1], axis=1)
+    twice = same & ~changed
+    are_copies = bool(number) and np.array_equal(same, twice) and 2 * np.sum(changed) >= np.sum(~same)
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
     is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
-    if of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps[~same] if is_seldom else steps):
+    is_even = np.std(waits) < STREAM.paced * np.std(steps[~same] if is_seldom else steps)
+    if of > SHAFT.fewest_samples and is_even and not are_copies:
         quantum = int(np.gcd.reduce(steps))
         if quantum > STREAM.irregular * np.median(steps[~same]):
             return _received(rows, stamps, received, quantum)
@@ -312,7 +318,6 @@ def _received(rows: Index, stamps: Times, received: Times, quantum: int) -> _Tim
 def _treated(one: Source) -> Source:
     """The source without wraps and jumps of the zero, and with what is known of its gaps."""
     values, treated = dict(one.values), list(one.treated)
-    is_measured = {"position", "velocity"} <= values.keys() and not one.is_command
     for quantity, value in values.items():
         if not one.is_command and (number := int(np.sum(held := _held_over(value)))):
             values[quantity] = np.where(held, math.nan, value)
@@ -333,11 +338,10 @@ def _treated(one: Source) -> Source:
             whole = np.cumsum(jumps)[row_at(shown.time, one.time)]
             values["position"] = values["position"] - whole
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
-    factor, lag = velocity_fit(one._replace(values=values)) if is_measured and not rests(one) else (math.nan, 0.0)
-    if lag or not factor:
+    _, unfit = (math.nan, None) if one.is_command else velocity_fit(one._replace(values=values))
+    if unfit:
         del values["velocity"]
-        what = (Treatment.LATE, "delay of the velocity") if lag else (Treatment.UNFILLED, "velocity")
-        treated.append(Treated(*what, len(one.time), len(one.time), lag))
+        treated.append(unfit)
     return one._replace(values=values, treated=tuple(treated))
 
 
@@ -382,18 +386,17 @@ def _jumps(shown: Source) -> Numbers:
     result = np.zeros(len(position))
     if len(position) < SHAFT.fewest_samples:
         return result
-    steps = np.diff(position)
+    steps, waits, finest = np.diff(position), np.diff(shown.time), 0.0
     if "velocity" in shown.values:
         velocity = shown.values["velocity"]
-        moved, finest = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(shown.time), 0.0
-        fastest = np.abs(moved)
+        moved = 0.5 * (velocity[1:] + velocity[:-1]) * waits
     else:
-        around = np.lib.stride_tricks.sliding_window_view(np.pad(steps, STREAM.around, "edge"), 2 * STREAM.around + 1)
-        moved, fastest = np.median(around, axis=1), np.sort(np.abs(around), axis=1)[:, -2]  # but for the step itself
+        rates = np.pad(steps / waits, STREAM.around, "edge")
+        moved = np.median(sliding_window_view(rates, 2 * STREAM.around + 1), axis=1) * waits
         finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
     rest = steps - moved
     usual = STREAM.zero * max(float(np.quantile(np.abs(rest), 1.0 - STREAM.repeated)), finest)
-    least = np.maximum(STREAM.beyond * np.maximum(fastest, np.max(np.abs(moved))), max(usual, SHAFT.joint_rest))
+    least = max(STREAM.beyond * float(np.max(np.abs(moved))), usual, SHAFT.joint_rest)
     jumps = (np.abs(rest) > least) & ~after_gaps(shown.time)[1:]
     if np.sum(jumps) <= STREAM.repeated * len(steps):
         result[1:][jumps] = rest[jumps]
@@ -418,16 +421,13 @@ def command_of(source: Source, commands: Sequence[Source], states: Sequence[Sour
     """The command of a joint by its name, of a wrench in its frame or with none; of several the one named most alike.
 
     A command is of the states whose topics share most parts with its own: of two robots, as /left/joint_states and
-    /right/joint_states, neither has that of the other.
+    /right/joint_states, neither has that of the other.  What a controller reports with its command does not count.
     """
-    alike = [one for one in states if one.name == source.name]
-    own = [
-        one
-        for one in commands
-        if one.name == source.name
-        and (source.is_joint or source.shares_frame(one))
-        and _shared(one, source) == max(_shared(one, other) for other in alike)
-    ]
+    own = [one for one in commands if one.name == source.name and (source.is_joint or source.shares_frame(one))]
+    for one in tuple(own):
+        others = (two for two in states if two.name == source.name and f"{two.topic} {COMMAND}" != one.topic)
+        if _shared(one, source) < max((_shared(one, two) for two in others), default=0):
+            own.remove(one)
     return max(own, key=lambda one: _shared(one, source), default=None)
 
 
@@ -528,27 +528,50 @@ def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
     return slope, _of_slope(sd, half)
 
 
-def velocity_fit(source: Source) -> tuple[float, float]:
-    """Recorded velocity over the rate of the position, and its delay, s, where that counts, else 0.
+def velocity_fit(source: Source) -> tuple[float, Treated | None]:
+    """Recorded velocity over the rate of the position, and why it is left out, if it has to be.
 
-    The factor is NaN where the position does not move, and below zero where the sign is swapped.
+    The factor is NaN where the position does not move or one of them is lacking, and below zero where the sign is
+    swapped.
     """
     parts = [np.zeros((0, 3))]
-    for piece in pieces(source, "position", "velocity"):
-        rate, sd = differentiated(piece.time, piece.values["position"])
-        moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * sd)
-        columns = np.column_stack([piece.values["velocity"], rate, np.gradient(rate, piece.time)])
-        parts.append(columns[moves])
+    shown = source.only("position", "velocity")
+    has_both = len(shown.values) == 2 and not rests(source)
+    for piece in pieces(shown) if has_both else ():
+        period = float(piece.time[1] - piece.time[0])
+        width = max(1, round(STREAM.averaged / period))
+        if len(piece.time) > width + 1:
+            rate, mean = (way / (width * period) for way in ways(piece, width))
+            moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["position"] / (width * period))
+            parts.append(np.column_stack([mean, rate, np.gradient(rate, period)])[moves])
     velocity, rate, change = np.vstack(parts).T
     if len(rate) < SHAFT.fewest_samples:
-        return math.nan, 0.0
-    columns = np.column_stack([rate, change])
+        return math.nan, None
+    columns, recorded = np.column_stack([rate, change]), shown.values["velocity"]
+    if not np.any(recorded):
+        return 0.0, Treated(Treatment.UNFILLED, "velocity")
     now, before = np.linalg.lstsq(columns, velocity, rcond=None)[0]
-    kept, lost = np.linalg.norm(columns * (now, before), axis=0) / np.linalg.norm(rate)
+    kept, lost, slope, left = (
+        float(np.linalg.norm(each) / np.linalg.norm(rate))
+        for each in (now * rate, before * change, change, velocity - columns @ (now, before))
+    )
     factor = math.copysign(math.hypot(kept, lost), now)
-    lag = math.atan2(lost, kept) * float(np.linalg.norm(rate) / np.linalg.norm(change)) if before < 0.0 else 0.0
-    is_late = abs(factor - 1.0) <= SHAFT.agree and lost > SHAFT.late and lag > float(np.median(np.diff(source.time)))
-    return factor, lag * is_late
+    # of noise, slips, and what few samples hide of a motion
+    doubt = SHAFT.late + left + float(np.sum(np.diff(recorded) ** 2) / np.sum(recorded**2)) / 6.0
+    lag = math.atan2(lost, kept) / slope if before < 0.0 < slope else 0.0
+    if abs(factor - 1.0) > SHAFT.agree:
+        return factor, None  # they contradict each other
+    if lost > doubt and lag > float(np.median(np.diff(source.time))):
+        return factor, Treated(Treatment.LATE, "delay of the velocity", size=lag)
+    return factor, Treated(Treatment.SCALED, "velocity", size=factor) if abs(factor - 1.0) > doubt else None
+
+
+def ways(piece: Piece, width: int) -> tuple[Numbers, Numbers]:
+    """By how much a joint moves in so many periods, by its position and by its recorded velocity."""
+    position, velocity = piece.values["position"], piece.values["velocity"]
+    steps = 0.5 * (velocity[1:] + velocity[:-1]) * (piece.time[1] - piece.time[0])
+    by = np.concatenate(([0.0], np.cumsum(steps)))
+    return position[width:] - position[:-width], by[width:] - by[:-width]
 
 
 def _of_slope(sd: float, half: int) -> float:

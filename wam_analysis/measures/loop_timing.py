@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Numbers, Times
 
 
@@ -14,6 +15,7 @@ class StampTiming(NamedTuple):
     Attributes
     ----------
     period : between two stamps, median, s.
+    slowest : the longest usual one, s, where the rate changes.
     missed : periods without a message.
     longest_gap : between two stamps, s.
     backwards : stamps that are not later than the one before.
@@ -22,6 +24,7 @@ class StampTiming(NamedTuple):
     """
 
     period: float
+    slowest: float
     missed: int
     longest_gap: float
     backwards: int
@@ -38,17 +41,16 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
     received : (n,), ns, reception times by the clock of the recorder; None if they have no meaning,
         as in lockstep bags, whose log times are the stamps.
     """
-    steps = np.diff(stamp)
-    forward = steps[steps > 0]
-    period = float(np.median(forward)) if len(forward) else math.nan
-    skipped = _skipped(forward / period) if len(forward) else np.zeros(0, dtype=np.int64)
+    steps, times = np.diff(stamp), np.unique(stamp)
+    periods = _periods(np.diff(times).astype(np.float64)) if len(times) > 1 else np.full(1, math.nan)
     jitter = worst = math.nan
     if received is not None:
         intervals: Numbers = np.diff(np.sort(received).astype(np.float64)) / 1e9
         jitter, worst = float(np.std(intervals)), float(np.max(intervals))
     return StampTiming(
-        period=period / 1e9,
-        missed=int(np.sum(skipped)),
+        period=float(np.median(np.diff(times))) / 1e9 if len(times) > 1 else math.nan,
+        slowest=float(np.max(periods)) / 1e9,
+        missed=_missed(times, periods),
         longest_gap=float(np.max(steps)) / 1e9,
         backwards=int(np.sum(steps <= 0)),
         jitter=jitter,
@@ -56,16 +58,30 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
     )
 
 
-def _skipped(steps: Numbers) -> Times:
-    """Messages that are missing in each step, (n,), periods.
+def _periods(steps: Numbers) -> Numbers:
+    """The usual step about each, (n,): that of all, or of the steps about it where these are even, as at another rate.
 
-    A step of less than two periods is that of a late message where the steps about it are shorter by as much.
+    Where many are missing the median of all is longer than a period.
     """
-    single = steps[np.rint(steps) == 1.0]
-    steps = (
-        steps / float(np.median(single)) if len(single) else steps
-    )  # where many are missing the median of all is longer than a period
-    skipped = np.maximum(np.rint(steps).astype(np.int64) - 1, 0)
-    around = np.convolve(np.pad(steps, 1, "edge"), np.ones(3), "valid")
-    skipped[(steps < 2.0) & (around < 3.5)] = 0
-    return skipped
+    usual = float(np.median(steps))
+    usual = float(np.median(steps[np.rint(steps / usual) == 1.0]))
+    number = len(steps) // STREAM.steps
+    if not number:
+        return np.full(len(steps), usual)
+    parts = steps[: number * STREAM.steps].reshape(number, STREAM.steps)
+    own = np.median(parts, axis=1, keepdims=True)
+    is_even = np.mean(np.abs(parts - own) <= STREAM.pace * own, axis=1) >= STREAM.evenly
+    near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
+    slowest = np.maximum(np.maximum(near[:-2], near[2:]), near[1:-1])
+    return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
+
+
+def _missed(times: Times, periods: Numbers) -> int:
+    """Messages that are missing among rising times: what came late is near the time that it left out."""
+    steps = np.diff(times)
+    rows = np.flatnonzero(steps > STREAM.changes * periods)
+    long, period = steps[rows], periods[rows]
+    first = np.searchsorted(times, times[rows] - long)
+    last = np.searchsorted(times, times[rows + 1] + long, side="right") - 1
+    there = (times[last] - times[first]) / period - (last - first)
+    return int(np.sum(np.clip(np.rint(there), 0, np.rint(long / period) - 1)))
