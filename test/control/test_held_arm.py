@@ -16,7 +16,7 @@ from wam_control.force.force_loop import ForceInput, ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.held_arm import PushedArm
 from wam_description.event import Code
-from wam_description.signals import NO_CONTACT, ForceCommand, State
+from wam_description.signals import NO_CONTACT, Contact, ForceCommand, State
 
 Array = NDArray[np.float64]
 PACKAGED = CONFIGURATION.node("force_loop", ForceLoopParameters)
@@ -44,14 +44,14 @@ class Pushed:
     def at(self) -> Array:
         return BODY.point(self.q, "outer_link", MIDDLE)
 
-    def go(self, seconds: float, hand: Any = (0.0, 0.0, 0.0)) -> None:
+    def go(self, seconds: float, hand: Any = (0.0, 0.0, 0.0), contact: Contact = NO_CONTACT) -> None:
         """Push with a force of the world, N."""
         for _ in range(round(seconds / DT)):
             torques = np.array(hand) @ BODY.point_jacobian(self.q, "outer_link", MIDDLE)
             sensors = State(self.q, STILL, (BODY.gravity_torque(self.q) - torques).tolist())
             command = ForceCommand("base", self.force) if any(self.force) else None
             joints = State(self.q, STILL, DRIVEN)
-            out = self.loop.step(ForceInput(joints, DT, sensors, NO_CONTACT, command=command))
+            out = self.loop.step(ForceInput(joints, DT, sensors, contact, command=command))
             self.codes |= {event.code for event in self.loop.events}
             self.q = [a + v * DT for a, v in zip(self.q, out.velocity, strict=True)]
 
@@ -106,13 +106,17 @@ def test_pushes_again_and_again_move_it_no_further_than_one() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [60.0])
-def test_what_pushes_less_than_allowed_moves_nothing(size: float) -> None:
-    arm = Pushed()
+def test_what_pushes_less_than_allowed_moves_nothing_until_a_command_allows_less() -> None:
+    """What pushed before a command, and is no payload, pushes on."""
+    arm = Pushed(replace(OWN, sensing=PACKAGED.sensing))
     begin = arm.at
-    arm.go(1.0, size * UP)
+    arm.go(1.0, 60.0 * UP)
     assert arm.at == pytest.approx(begin, abs=1e-6)
     assert not arm.codes
+    arm.force = 0.0, 5.0, 0.0
+    arm.go(0.3, 60.0 * UP, Contact("outer_link", 0.28, (0.0, 60.0, 0.0), 0.001, 1.0))
+    assert Code.PUSHED in arm.codes
+    assert (arm.at - begin)[2] > 0.01
 
 
 @pytest.mark.slow

@@ -206,10 +206,10 @@ class CommandRun:
         """Whether something is touched by one of its forces."""
         return any(one.watch.touch.is_there for one in self.axes)
 
-    def judge(self, q: Sequence[float], measurement: ForceMeasurement, forces: ForceAxes) -> None:
+    def judge(self, q: Sequence[float], measurement: ForceMeasurement, forces: ForceAxes, limit: float) -> None:
         """Decide once, for the first axis, whether the torques at rest are those of a touched surface.
 
-        What a payload explains may always be one.
+        What a payload explains may always be one.  Else those above a limit, N m, are no error of the model.
         """
         axis = self.axes[0].now if self.axes else None
         if self._is_decided or axis is None or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
@@ -219,7 +219,7 @@ class CommandRun:
         if mass > 0.0 and left <= FORCE.unexplained:
             return
         force = axis.force(torques)
-        if axis.sensed is not None and axis.place is not None:
+        if axis.sensed is not None and axis.place is not None and float(np.abs(torques).max()) <= limit:
             pressed = axis.place.pressed(axis.direction, abs(force))
             if force <= 0.0 or forces.axis(q, pressed).unexplained(torques) > FORCE.unexplained:
                 return

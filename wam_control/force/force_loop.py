@@ -310,7 +310,7 @@ class ForceLoop:
         q = np.array(self._q)
         moved = q - (q if run.before is None else run.before)
         run.before = q
-        run.judge(self._q, self._measurement, forces)
+        run.judge(self._q, self._measurement, forces, own.sensing.zero_limit)
         knowledge = self._knowledge
         for one in run.axes:
             one.known = knowledge.of(self._q, one.on_links)
