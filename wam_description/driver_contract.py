@@ -82,7 +82,7 @@ REQUIREMENTS: Final = {
     ),
     "answers": Requirement(
         "refuses a command without a stamp, or with a stamp in the future",
-        "refuse stamps that are not above 0 and at most that of the newest state",
+        "accept only stamps above 0 and up to that of the newest state",
     ),
     "watchdog": Requirement(
         "stops the current at most 50 ms after the last command, and faults",
@@ -118,7 +118,7 @@ REQUIREMENTS: Final = {
     ),
     "agreement": Requirement(
         "brakes and refuses enable while the `shared parameters` of two nodes differ",
-        "compare them as text, and with your own node's; two configurations are in use",
+        "compare the texts of all nodes with your own; if they differ, two configurations are in use",
     ),
     "end": Requirement(
         "at SIGTERM, brakes and reports it before the process ends",

@@ -128,7 +128,7 @@ class Realtime:
             return ""
         part, allowed = 100.0 * late / count, 100.0 * self._late_periods
         return (
-            f"{part:.3g} % of the newest periods were late, allowed {allowed:.3g} %: "
+            f"{part:.3g} % of the newest periods were late; allowed: {allowed:.3g} %; "
             "this computer is too busy or too slow for realtime; end other programs, or use lockstep"
         )
 
@@ -155,7 +155,7 @@ class Realtime:
             return Answer(False, "refused: the driver is running; call pause first")
         self._driver.advance(0.0)
         self._send()
-        return Answer(True, f"at {self._driver.stamp} ns")
+        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp} ns")
 
     def facts(self) -> dict[str, str]:
         """For the diagnostics: latencies since the last report, late periods and rate since the start."""

@@ -60,7 +60,7 @@ class Safety:
         self._brake()
         if self.mode is Mode.ENABLED:
             self.mode = Mode.BRAKED
-        return Answer(True, f"{self.mode.value}: currents zero; {self.held}")
+        return Answer(True, f"{self.mode.value}: the currents are zero; {self.held}")
 
     def trip(self, event: Event) -> None:
         """Brake and latch a fault; the first one is kept."""

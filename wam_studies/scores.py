@@ -204,8 +204,8 @@ def by_group(
     lines = []
     for first, *others in zip(*map(rows, groups.values()), strict=True):
         cells = [f"{row.cells[0]} ({row.found.observed})" for row in (first, *others)]
-        lines.append([", ".join(filter(None, (first.name, first.unit))), *cells])
-    return ScoreTable(title, ["quantity", *groups], lines, note)
+        lines.append([first.name + f" [{first.unit}]" * bool(first.unit), *cells])
+    return ScoreTable(title, ["quantity (observations)", *groups], lines, note)
 
 
 class Scores(NamedTuple):

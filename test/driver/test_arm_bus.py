@@ -175,7 +175,7 @@ def test_the_zero_is_lost_with_the_counts_of_one_controller(version: int) -> Non
     rig.bus.controllers[3].values.update(STAT=0, P=3000)
     rig.arm.begin()
     assert rig.start(2.0)[-1] is Wait.HOME
-    assert rig.arm.advice.endswith("lost their counts: 3")
+    assert rig.arm.advice.endswith("lost their position: 3")
     rig.arm.begin()  # it is awake now, and still without its counts
     assert rig.start(2.0)[-1] is Wait.HOME
     rig.bus.switch(SafetyMode.ACTIVE)

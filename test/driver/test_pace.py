@@ -227,7 +227,7 @@ def test_of_a_computer_that_is_too_slow_for_realtime_the_late_periods_are_named_
     play(2000, every=20)  # 100 of 2100
     assert realtime.lateness == ""
     play(1500, every=2)
-    assert realtime.lateness.startswith("33.3 % of the newest periods were late, allowed 5 %: ")
+    assert realtime.lateness.startswith("33.3 % of the newest periods were late; allowed: 5 %; ")
     play(2000, every=20)
     assert realtime.lateness == ""
 

@@ -236,7 +236,7 @@ def test_where_many_periods_are_late_a_fault_names_the_computer(is_reported: boo
     strict.ros.wait(lambda: strict.driver.safety.mode is Mode.FAULT, what="a fault")
     begin = "velocity_loop: force_loop has stopped; " if is_reported else "command stale: "
     assert strict.driver.safety.fault.startswith(begin)
-    assert "% of the newest periods were late, allowed 5 %: this computer is too" in strict.driver.safety.fault
+    assert "% of the newest periods were late; allowed: 5 %; this computer is too" in strict.driver.safety.fault
     assert is_reported or "; check that velocity_loop runs; " in strict.driver.safety.fault
 
 
@@ -247,7 +247,7 @@ def test_where_many_periods_are_late_the_brakes_stay_on(strict: Hand) -> None:
         strict.wait_periods(2)
     answer = strict.ask("enable", True)
     assert not answer.success
-    assert "% of the newest periods were late, allowed 5 %: this computer is too" in answer.message
+    assert "% of the newest periods were late; allowed: 5 %; this computer is too" in answer.message
     assert strict.driver.safety.mode is Mode.BRAKED
 
 

@@ -97,7 +97,7 @@ def test_the_sets_are_counted_by_force_too() -> None:
     """Of all forces together the sets of strong ones, a third of which held the truth, were hidden by the others."""
     light = TOUCH
     strong = light._replace(force=40.0, in_set=False)
-    held = column_of(table("By kind", driven(scored(light, strong, strong))), "90 % set contains the truth, %")
+    held = column_of(table("By kind", driven(scored(light, strong, strong))), "90 % set contains the truth [%]")
     assert (held["outer"], held["0 to 7.5 N"], held["30 to 80 N"]) == ("33.3 (3)", "100 (1)", "0 (2)")
 
 
@@ -140,7 +140,7 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     assert believing.alarms
     assert loaded.warnings > 0.5
     assert coarse.warnings == 0.0
-    assert list(table("By degradation", driven(coarse, loaded)).head) == ["quantity", COARSE, LOADED]
+    assert list(table("By degradation", driven(coarse, loaded)).head) == ["quantity (observations)", COARSE, LOADED]
 
 
 @pytest.mark.slow
@@ -154,7 +154,7 @@ def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_re
     assert carried.detected
     assert outcome.kind == "picking up"
     drives = [*driven(score), *driven(score, group="masses")]
-    assert column_of(table("Picking up", drives), "reported at all, %")["all"] == "100 (1)"
+    assert column_of(table("Picking up", drives), "reported at all [%]")["all"] == "100 (1)"
     assert "picking up" in table("By kind", drives).head
 
 

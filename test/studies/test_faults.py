@@ -95,9 +95,9 @@ def test_escapes_are_counted_by_kind_and_each_is_listed() -> None:
     scores = study.score(records)
     assert {row.name: row.found.value for row in scores.rows} == {"escapes, messages": 1.0, "escapes, losses": 0.0}
     assert scores.missed == ["escapes, messages: 1, required 0"]
-    assert scores.tables[0].head == ["quantity", "messages", "losses"]
+    assert scores.tables[0].head == ["quantity (observations)", "messages", "losses"]
     worst = {line[0]: line[1:] for line in scores.tables[0].rows}
-    assert (worst["escapes"], worst["largest delay, ms"]) == (["1 (2)", "0 (1)"], ["– (0)", "42 (1)"])
+    assert (worst["escapes"], worst["largest delay [ms]"]) == (["1 (2)", "0 (1)"], ["– (0)", "42 (1)"])
     assert [study.failure(one) for one in records] == ["messages, a fault: the arm moved", "", ""]
 
 

@@ -108,7 +108,7 @@ def motion(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotionSamples:
     centres = centres[is_used[spans].all(1)]
     if len(centres) * step * period < IDENTIFY.shortest:
         raise ValueError(
-            f"{len(centres) * step * period:.3g} s of free states without brakes and gaps; "
+            f"{len(centres) * step * period:.3g} s can be used, without brakes and gaps; "
             f"identification needs {IDENTIFY.shortest:g} s or more"
         )
     windows = centres[:, None] + np.arange(-half, half + 1)

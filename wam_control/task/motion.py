@@ -303,8 +303,8 @@ class LineMotion:
         missed = float(np.linalg.norm(target - body.tool_pose(self._angles[-1]).position))
         require(
             missed < MOTION.reached,
-            f"at {distance:.3g} m of the line of {self._length:.3g} m the tip is {missed:.3g} m off; allowed: "
-            "positions within the reach of the arm; give another goal, m in the base frame",
+            f"the arm cannot follow the line of {self._length:.3g} m beyond {distance:.3g} m, where its tip would be "
+            f"{missed:.3g} m off; give another goal, m in the base frame",
         )
 
     def _slope(self, arm: Arm, body: RigidBody, along: Array, distance: float) -> Array:

@@ -75,7 +75,7 @@ class ArmBus:
     def advice(self) -> str:
         """What a person has to do, in words; '' where nothing."""
         woken = ", ".join(map(str, self._host.woken))
-        reason = f"; controllers that have lost their counts: {woken}" if woken and self.wait is Wait.HOME else ""
+        reason = f"; motor controllers that lost their position: {woken}" if woken and self.wait is Wait.HOME else ""
         return self.wait.value + reason
 
     def brake(self, on: bool) -> None:

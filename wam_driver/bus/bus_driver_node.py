@@ -151,7 +151,7 @@ class BusDriver(ArmDriver):
     def _confirm_home(self, _: Any) -> Answer:
         if self.hardware.confirm_home():
             return Answer(True, "the zero is set")
-        return Answer(False, f"refused: this is not what the driver waits for; {self.advice}".removesuffix("; "))
+        return Answer(False, f"refused: the driver does not wait for the home pose; {self.advice}".removesuffix("; "))
 
     def destroy_node(self) -> None:
         """Brake, report it, and end when the others have the last messages."""
