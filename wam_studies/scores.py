@@ -240,7 +240,8 @@ def rows_table(rows: Sequence[Row], by_seed: Mapping[int, Sequence[Row]] = {}) -
     """
     seeds = list(by_seed) if len(by_seed) > 1 else []
     single = {(seed, row.name): number(row.found.value, row.scale) for seed in seeds for row in by_seed[seed]}
-    head = ["quantity", "unit", "required", "target", *(f"seed {seed}" for seed in seeds), "all", "95 %", "n", ""]
+    of_all = ["all seeds" if seeds else "value", "95 % interval", "n", ""]
+    head = ["quantity", "unit", "required", "target", *(f"seed {seed}" for seed in seeds), *of_all]
     lines = []
     for row in rows:
         if row.found.observed or row.is_bounded:
@@ -269,5 +270,5 @@ def bound_text(bound: Bound, scale: float) -> str:
     if bound == ANY:
         return ""
     if bound[0] <= 0.0:
-        return high
-    return f"at least {low}" if bound[1] in (1.0, math.inf) else f"{low} to {high}"
+        return f"≤{high}" if bound[1] > 0.0 else high
+    return f"≥{low}" if bound[1] in (1.0, math.inf) else f"{low} to {high}"

@@ -193,9 +193,9 @@ def test_rows_of_synthetic_contacts_are_those_that_went_in() -> None:
 
 def test_a_missed_must_is_named_and_a_met_one_is_not() -> None:
     bad = "; ".join(STUDY.score(synthetic(0.04, 0.07, 0.93)).missed)
-    assert "position on the outer link at 5 N, median error: 4 cm, required 3" in bad
+    assert "position on the outer link at 5 N, median error: 4 cm, required ≤3" in bad
     assert "5 N on the outer link detected within 60 ms" in bad
-    assert "wrong link: 7 %, required 5" in bad
+    assert "wrong link: 7 %, required ≤5" in bad
     assert STUDY.score(synthetic(0.004, 0.02, 1.0)).missed == []
     half = found("position on the outer link at 5 N, median error", synthetic(0.01, 0.02, 0.4))
     assert half.value == math.inf, "half the contacts without a place"

@@ -104,9 +104,9 @@ def test_a_study_that_was_stopped_goes_on_from_its_file(tmp_path: Path) -> None:
 
 def test_a_missed_value_and_each_failed_case_with_its_command_are_printed() -> None:
     found = measured(count=4)
-    assert found.scores.missed == ["largest: 9 m, required 5"]
+    assert found.scores.missed == ["largest: 9 m, required ≤5"]
     text = report(found, "wam evaluate square")
-    assert "| largest | m | 5 |  | 9 | 9 | 9 |  | 8 | **MISSED** |" in text
+    assert "| largest | m | ≤5 |  | 9 | 9 | 9 |  | 8 | **MISSED** |" in text
     assert "* seed 2, case 3: 9\n  `wam evaluate square --seeds 2 --only 3`" in text
     assert "## Numbers" in text
 
@@ -124,7 +124,7 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
         with_section(file, "other", "")
     for words in ("`wam evaluate square --write page.md`: 6 cases", "![squares](page/square.png)", "Every required"):
         assert words in text
-    assert "| largest | m | 5 |  | 4 |" in text
+    assert "| largest | m | ≤5 |  | 4 |" in text
     assert "## Numbers" not in text
 
 
