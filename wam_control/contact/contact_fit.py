@@ -212,7 +212,7 @@ class ContactFit:
         """
         grams: list[Gram] = gram.tolist()
         links = [self._link(i, one) for i, one in enumerate(grams)]
-        pieces = self._along(len(grams) - 1, grams[-1])
+        pieces, left = self._along(len(grams) - 1, grams[-1])
         for i, (link, values) in enumerate(zip(links, self._log_density(links), strict=True)):
             pieces += self._grid(i, link, values)
             pieces += self._at_ends(i, link)
@@ -221,7 +221,8 @@ class ContactFit:
         pieces.sort(reverse=True)
         parts, total = self._parts(pieces)
         total += math.exp(min(other - pieces[0][0], CONTACT.largest_exponent))
-        return [self._fit(link, part, total, ends) for link, part, ends in zip(links, parts, self._ends, strict=True)]
+        each = zip(links, parts, self._ends, strict=True)
+        return [self._fit(link, part, total, ends, left) for link, part, ends in each]
 
     def _link(self, i: int, gram: Gram) -> _Link:
         """A link with the tangential force in the covariance, of the size at the likeliest of some places.
@@ -275,16 +276,17 @@ class ContactFit:
         places = [start + 0.5 * width] * (i > 0) + [end - 0.5 * width] * (i + 1 < len(self._ends))
         return [(link.log_density(x) + constant, x, width, i, False) for x in places]
 
-    def _along(self, i: int, gram: Gram) -> list[Piece]:
+    def _along(self, i: int, gram: Gram) -> tuple[list[Piece], float]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
-        A force along the tube equals the same force at its start: no joint torques distinguish them.
+        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns what the
+        best of them does not explain, chi^2, too.
         """
         scale, weight, (start, end) = self._given.force_scale, self._given.along_weight, self._ends[i]
         if not weight:
-            return []
+            return [], math.inf
         size = abs(gram[0][AXIAL]) / (gram[AXIAL][AXIAL] + scale**-2) + CONTACT.smallest_force
-        arm, length, found = math.sqrt(0.5) * self._radius[i] * size, end - start, []
+        arm, length, found, left = math.sqrt(0.5) * self._radius[i] * size, end - start, [], math.inf
         pieces = [([(3, arm)], [(4, arm)], start + 0.5 * length, length, 1)]
         for slope in CONTACT.end_slopes:
             lean, far = slope * size, slope * size * end
@@ -295,7 +297,8 @@ class ContactFit:
             ((rr, ra), (_, aa)), volume = widened(gram, one, two, slice(0, None, AXIAL))
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume
             found.append((value + math.log(weight / (count * width)), x, width, i, True))
-        return found
+            left = min(left, rr - ra * ra / (aa + scale**-2))
+        return found, left
 
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
         """What the pieces, the most probable first, are of each link, and the sum of their weights."""
@@ -322,7 +325,7 @@ class ContactFit:
                 part.low, part.high = min(low, part.low), max(high, part.high)  # of a NaN the first one is taken
         return parts, total
 
-    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair) -> Fit:
+    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, left: float) -> Fit:
         start, end = ends
         is_along, rest = part.along > 0.5 * part.mass, part.mass - part.along
         place = part.first_along / part.along if is_along else (part.first - part.first_along) / rest
@@ -349,5 +352,5 @@ class ContactFit:
             direction_sd=min(math.sqrt(about) / size, math.pi),
             torque_position_sd=link.torque_position_sd(place, force),
             force_at_end=link.force(end)[0],
-            residual=max(0.0, link.gram[0][0] - explained - link.precision * size * size),
+            residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
