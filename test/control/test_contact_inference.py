@@ -315,12 +315,14 @@ def test_a_push_on_the_tip_along_the_tube_is_one_at_the_elbow_and_no_link_is_cer
 
 
 def test_a_push_across_the_tube_is_not_taken_for_one_along_it() -> None:
+    bent, tared = (0.0, -2.07, 0.0, 1.45), np.diag(np.array([0.02, 0.056, 0.027, 0.03]) ** -2.0)  # 83 N along
     for x in (0.1, 0.2, 0.3):
-        found = infer(POSE, "outer_link", (x, 0, 0), (0, 4, 3))[0]
-        assert found.cover == "outer_link"
-        assert found.probability > 0.95
-        assert Reason.ALONG not in found.reasons
-        assert found.position == pytest.approx(x, abs=0.02)
+        for q, precision, force in ((POSE, W, (0, 4, 3)), (bent, tared, (0, 8, 0))):
+            found = INFERENCE.infer(q, torques(q, "outer_link", (x, 0, 0), force).tolist(), precision)[0]
+            assert found.cover == "outer_link"
+            assert found.probability > 0.95
+            assert not found.reasons
+            assert found.position == pytest.approx(x, abs=0.02)
 
 
 def test_torques_that_are_said_to_be_exact_are_no_more_certain_than_rounding() -> None:

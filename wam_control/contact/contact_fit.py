@@ -240,7 +240,12 @@ class ContactFit:
         twist = [(TWIST, given.moment_arm_offset * radius * size)]
         axial = [(AXIAL, given.friction * size), (3, turn * f1), (4, turn * f2)]
         wide, volume = widened(gram, twist, axial, slice(5))
-        return _Link.of(wide, min(precision, 1.0 / (largest * largest + CONTACT.smallest_force)), volume)
+        precision = min(precision, 1.0 / (largest * largest + CONTACT.smallest_force))
+        return _Link.of(wide, precision, volume + 2.0 * self._log_rarity(largest))
+
+    def _log_rarity(self, size: float) -> float:
+        """Log of how much rarer a force of a size, N, is: above its scale in inverse proportion to the size."""
+        return math.log(max(size / self._given.force_scale, 1.0))
 
     def _log_density(self, links: Sequence[_Link]) -> list[list[float]]:
         """`_Link.log_density` of all pieces of the grid."""
@@ -295,7 +300,7 @@ class ContactFit:
             )
         for one, two, x, width, count in pieces:
             ((rr, ra), (_, aa)), volume = widened(gram, one, two, slice(0, None, AXIAL))
-            value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume
+            value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - self._log_rarity(size)
             found.append((value + math.log(weight / (count * width)), x, width, i, True))
             left = min(left, rr - ra * ra / (aa + scale**-2))
         return found, left
