@@ -390,20 +390,21 @@ def wrong_efforts() -> list[Case]:
 
 
 def other_units() -> list[Case]:
-    def scaled(quantity: str, by: float, write: Any, *units: str) -> Case:
+    def scaled(quantity: str, by: float, write: Any, wrong: str, *units: str) -> Case:
         sent = one("/joint_states", 100.0, 0.7, 0.5)
         sent = [s._replace(fields=s.fields | {quantity: by * s.fields[quantity]}) for s in sent]
-        told = " or ".join(f"--unit {quantity}={unit}" for unit in units)
-        return Case(quantity, write, sent, {}, f"if it is in another one, give {told}.")
+        told = " or ".join(f"--unit {quantity}={unit})" for unit in units)
+        return Case(quantity, write, sent, {}, wrong, NOTHING, (f"If it was recorded in another unit, give {told}.",))
 
     degree = 180.0 / math.pi
     slow = one("/joint_states", 100.0, 0.7, 5.0)  # of 5 degrees
     alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
+    two, in_degrees = "one of the two has another unit", "if its position is in deg, give --unit position=deg"
     return [
-        Case("position alone", by_rosbags, alone, {}, "if its position is in deg, give --unit position=deg"),
-        scaled("position", degree, ros1, "deg", "mm"),
-        scaled("velocity", degree, sqlite, "deg/s", "rpm", "mm/s"),
-        scaled("effort", 1e3, by_rosbags, "mN", "mNm", "mA"),
+        Case("position alone", by_rosbags, alone, {}, "", NOTHING, (in_degrees,)),
+        scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),
+        scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "rpm (shown in rad/s", "mm/s (shown in m/s"),
+        scaled("effort", 1e3, by_rosbags, "", "mN (shown in N", "mNm (shown in N m", "mA (shown in A"),
     ]
 
 
@@ -423,6 +424,13 @@ def test_a_fault_is_read_right_and_said(case: Case, tmp_path: Path) -> None:
     assert case.wrong in wrong if case.wrong else not wrong
     every = " ".join(sentence for section in analysis.sections for sentence in section.sentences)
     assert all(sentence in every for sentence in case.absent)
+
+
+def test_shafts_of_motors_may_turn_often_and_fast(tmp_path: Path) -> None:
+    sent = [s._replace(fields={"name": ["motor1"], "position": s.fields["position"]})
+            for s in one("/joint_states", 100.0, 0.7, 20.0)]  # fmt: skip
+    found = analyse(by_rosbags(tmp_path / "bag", sent), lambda doing: None)
+    assert "--unit" not in str(found.sections)
 
 
 def test_a_map_to_more_values_than_names_is_refused(tmp_path: Path) -> None:

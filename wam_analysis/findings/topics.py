@@ -23,7 +23,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
     clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
-    wrong = [*_treated(found), *clocks]
+    wrong, doubts = [*_treated(found), *clocks], list[str]()
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers took turns; "
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
@@ -32,14 +32,14 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-        wrong += _too_large(name, columns, given, [one for one in found if one.topic == name])
-    wrong += _fast(found, given)
+        doubts += _too_large(name, columns, given, [one for one in found if one.topic == name])
+    doubts += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
     if computed := [one.label for one in found if _lacks_velocity(one)]:
         sentences.append(f"The velocity is computed from the position: {', '.join(computed)}.")
-    sentences += [*wrong, *_alike(found), *unread(bag)]
-    return Section("happened", "What happened", sentences, wrong=wrong)
+    sentences += [*wrong, *doubts, *_alike(found), *unread(bag)]
+    return Section("happened", "What happened", sentences, shows=doubts, wrong=wrong)
 
 
 def _topic(name: str, columns: Columns) -> Iterator[str]:
@@ -59,29 +59,37 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
 
 def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Source]) -> Iterator[str]:
     """Which values may be in another unit than that of ROS; a velocity that is the rate of a position is in none."""
+    slow = [not is_motor(joint) for joint in columns.names] if isinstance(columns, JointColumns) else []
     for quantity, most in UNUSUAL.items():
         values = np.abs(getattr(columns, quantity, np.empty(0)))
+        if slow and values.size and quantity in ("position", "velocity"):
+            values = values[:, slow]
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
         is_rate = quantity == "velocity" and any(abs(velocity_fit(one)[0] - 1.0) <= SHAFT.agree for one in found)
         if largest > most and quantity not in given.units and not is_rate:
-            taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, if read in the unit of ROS"
+            taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, more than most robots"
             smaller: dict[tuple[float, str], str] = {}  # each in its first spelling
             for unit, one in UNITS.items():
                 if one[0] < 1.0 and one[1] in QUANTITIES[quantity]:
                     smaller.setdefault(one, unit)
-            units = " or ".join(f"--unit {quantity}={unit}" for unit in smaller.values())
-            yield f"{name}: {taken}; if it is in another one, give {units}."
+            units = " or ".join(f"--unit {quantity}={unit} (shown in {to})" for (_, to), unit in smaller.items())
+            yield f"{name}: {taken}. If it was recorded in another unit, give {units}."
 
 
 def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
     """Which joints would move faster than few do, where their velocity was not recorded."""
     most = UNUSUAL["velocity"]
     for one in found:
-        if _lacks_velocity(one) and "position" not in given.units:
+        if _lacks_velocity(one) and "position" not in given.units and not is_motor(one.name):
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
             if max(speeds, default=0.0) > most:
                 fast = f"moves at up to {shown(float(max(speeds)), 'rad/s')}"
                 yield f"{one.label}: {fast}; if its position is in deg, give --unit position=deg."
+
+
+def is_motor(name: str) -> bool:
+    """Whether a joint is the shaft of a motor, which turns often and fast."""
+    return "motor" in name.lower()
 
 
 def _lacks_velocity(one: Source) -> bool:
