@@ -161,7 +161,7 @@ def read(
     attachments, metadata = dict[str, bytes](), dict[str, dict[str, str]]()
     for one in files(Path(path)):
         with opened(one) as file:
-            take = partial(_collector, collectors, file, (begin_ns, end_ns, as_messages))
+            take = partial(_collector, collectors, file, as_messages)
             if topics is None and begin_ns <= 0 and end_ns >= NEVER:
                 file.check_all()
             for channel, batch in parts(file, topics, begin_ns, end_ns):
@@ -197,12 +197,10 @@ def read(
     )
 
 
-def _collector(
-    collectors: dict[str, Collector], file: BagFile, how: tuple[int, int, bool], channel: Channel
-) -> Collector:
+def _collector(collectors: dict[str, Collector], file: BagFile, as_messages: bool, channel: Channel) -> Collector:
     """The collector of a topic, made for its first channel."""
     kind = type_of(file, channel)
-    collector = collectors.setdefault(channel.topic, Collector(kind, *how))
+    collector = collectors.setdefault(channel.topic, Collector(kind, as_messages))
     if collector.kind != kind:
         raise Damage(f"topic {channel.topic} has messages of two types, {collector.kind.name} and {kind.name}")
     return collector

@@ -129,14 +129,16 @@ def parts(
     Parameters
     ----------
     topics : names as for `is_selected`.
-    begin, end : log times that are needed, ns, begin <= t < end.  Others may come as well.
+    begin, end : log times that are read, ns, begin <= t < end.
     """
     numbers, times = None, (0, NEVER)
     if file.has_all_definitions():  # else any chunk may contain one that is needed
         times = begin, end
         if topics is not None:
             numbers = frozenset(n for n, channel in file.channels.items() if is_selected(channel.topic, topics))
-    for batch in file.batches(numbers, *times):
+    is_part = begin > 0 or end < NEVER
+    for found in file.batches(numbers, *times):
+        batch = found.of((found.times >= begin) & (found.times < end)) if is_part else found
         by_topic: dict[str, list[int]] = {}
         for number in np.flatnonzero(np.bincount(batch.channels)).tolist():
             if number not in file.channels:
@@ -146,7 +148,7 @@ def parts(
             if is_selected(topic, topics):
                 is_own = np.logical_or.reduce([batch.channels == number for number in members])
                 yield file.channels[members[0]], batch.of(np.flatnonzero(is_own))
-    if file.counts is None or begin > 0 or end < NEVER:
+    if file.counts is None or is_part:
         return
     for number, channel in file.channels.items():
         expected = file.counts.by_channel.get(number, 0)

@@ -139,14 +139,12 @@ class Collector:
     Parameters
     ----------
     kind : type of the messages.
-    begin, end : log times that are taken, ns, begin <= t < end.
     as_messages : whether no columns of the fields are made.
     """
 
-    def __init__(self, kind: MessageType, begin: int, end: int, as_messages: bool = False) -> None:
+    def __init__(self, kind: MessageType, as_messages: bool = False) -> None:
         self.kind = kind
         self._columned = _TYPES.get(kind.name) if kind.encoding == CDR and not as_messages else None
-        self._begin, self._end = begin, end
         self._times: list[Times] = []
         self._groups_of = Grouping(kind.name, kind.definitions)
         self._groups: list[tuple[Index, Any]] = []
@@ -155,9 +153,6 @@ class Collector:
 
     def add(self, found: MessageBatch) -> None:
         """Take these messages."""
-        taken = (found.times >= self._begin) & (found.times < self._end)
-        if not taken.all():
-            found = found.of(taken)
         self._times.append(found.times)
         if self._columned is not None:
             extract, _ = self._columned
@@ -307,6 +302,6 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
 
 def columns_of(kind: str, data: Sequence[bytes]) -> Columns:
     """Serialized messages of one installed type, ``package/msg/Type``, as columns; the log times are 0."""
-    collector = Collector(MessageType(kind, CDR, definitions(kind, schema(kind))), 0, 1)
+    collector = Collector(MessageType(kind, CDR, definitions(kind, schema(kind))))
     collector.add(packed([(0, 0, one) for one in data]))
     return collector.columns("recorded")
