@@ -465,7 +465,7 @@ def test_what_rosbag2_compressed_is_read_by_rosbags(
             writer.write(topic, k, STORE.serialize_cdr(STORE.types[kind](float(k)), kind))
     assert read(bag).topics["/x"].column("data").tolist() == list(range(50))
     for file in bag.glob("*.zstd"):
-        with pytest.raises(BagError, match="or the directory of a compressed one"):
+        with pytest.raises(BagError, match="if it is compressed, give its directory"):
             read(file)
 
 
