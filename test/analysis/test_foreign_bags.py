@@ -109,12 +109,12 @@ def wrench_beside_joints(path: Path) -> tuple[Made, dict[str, float]]:
 
 
 def no_velocities_and_a_weight(path: Path) -> tuple[Made, dict[str, float]]:
-    """Velocities are empty, positions in steps of an encoder, and gravity loads the joint."""
+    """Velocities are empty, positions in steps of an encoder, and gravity and a spring load the joint."""
     time = times(60.0)
     q, v, a = swung(time, 7)
     quantum = 2.0 * math.pi / 2**17
     position = np.column_stack([quantum * np.rint(q / quantum), np.zeros(len(time))])
-    effort = np.column_stack([loaded(q, v, a, WEIGHT, 8), np.zeros(len(time))])
+    effort = np.column_stack([loaded(q, v, a, WEIGHT, 8) + 2.0 * q, np.zeros(len(time))])
     sent = joints("/robot/joint_states", time, ["j1", "j2"], position=position, effort=effort)
     planted = {"j1: dry friction": DRY, "j1: viscous friction": VISCOUS, "j1: inertia": INERTIA}
     return (by_rosbags(path, sent), TopicMap()), planted

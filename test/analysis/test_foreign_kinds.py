@@ -137,6 +137,7 @@ def coarse() -> list[Case]:
 def twice() -> list[Case]:
     sent = one("/joint_states", 100.0, 0.7, 0.5)
     again = [s._replace(received=s.received + 0.003) for s in sent]
+    relayed = [s._replace(stamp=s.stamp + 0.003) for s in again]
     expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0}
     # at 0.4 of the computer's time; it stops for 12 s, and its last message is repeated
     slow = [s._replace(stamp=s.stamp - 1.7e9, received=s.stamp / 0.4 + 12.0 * (s.stamp > 13.0)) for s in sent]
@@ -144,6 +145,7 @@ def twice() -> list[Case]:
     return [
         Case("a simulation that stopped", ros1, slow, expected, "the first message of each is used"),
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
+        Case("relayed", by_mcap_ros2, sent + relayed, expected, "3000 of 6000 messages repeat the one before"),
         Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
     ]
 

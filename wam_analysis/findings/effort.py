@@ -60,8 +60,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
     doubts += [RECORD] * bool(doubts)
     assumed = (
-        "The fit explains the effort by friction, inertia, weight, drag (velocity squared) and, where it fits better, "
-        "a delay. The standard errors include what it does not explain."
+        "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where it fits "
+        "better, a delay. The standard errors include what it does not explain."
     )
     if alone:
         doubts.append(
@@ -141,10 +141,10 @@ def friction(source: Source) -> tuple[Friction, float]:
 
     The recorded velocity must be the rate of the position, see `contradiction`.
 
-    The effort may also hold the weight of the joint itself, over its angle, a sin q + b cos q, and a drag c v|v|, and
-    may lag behind the motion, as where it is filtered, or the motion behind it: a lag that leaves much less of the
-    effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the inertia is NaN;
-    so are viscous friction and lag, and no lag is looked for.
+    The effort may also hold the weight of the joint itself, over its angle, a sin q + b cos q, a spring d q, and a drag
+    c v|v|, and may lag behind the motion, as where it is filtered, or the motion behind it: a lag that leaves much less
+    of the effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the
+    inertia is NaN; so are viscous friction and lag, and no lag is looked for.
     """
     needed = [q for q in ("position", "velocity", "effort") if q in source.values]
     if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
@@ -164,7 +164,8 @@ def friction(source: Source) -> tuple[Friction, float]:
     }
     velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)
     has_weight = "position" in joined and source.units["position"] == "rad"
-    load = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])] if has_weight else [0.0 * velocity])
+    angle = joined.get("position", velocity)
+    load = np.column_stack([np.sin(angle), np.cos(angle), angle] if has_weight else [0.0 * velocity])  # and a spring
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     loads = np.column_stack([velocity * np.abs(velocity), load])  # with a drag
     time = period * np.arange(len(velocity), dtype=np.float64)

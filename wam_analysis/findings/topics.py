@@ -101,6 +101,8 @@ DONE_TO = {
     Treatment.ROUNDED: "the stamps are rounded to {size}; reception times are used",
     Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are placed evenly between them",
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
+    Treatment.RELAYED: "{number} of {of} messages repeat the one before at another interval, as by a relay; the others "
+    "are used",
     Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
     Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}; this is removed",
     Treatment.HELD: "{quantity} only repeated in {number} of {of} messages; the others are used",

@@ -27,6 +27,7 @@ class Treatment(StrEnum):
     ROUNDED = "rounded stamps"  # times of reception were used
     SPREAD = "coarse stamps, placed evenly"  # as are the times of reception: the messages were placed evenly
     TWICE = "messages that came twice"  # the second was left out
+    RELAYED = "messages that came again with other stamps"  # were left out
     WRAPPED = "wraps of the angle"  # were unwrapped
     MOVED_ZERO = "jumps of the zero"  # were taken off
     HELD = "values held over"  # from the message before: were left out
@@ -202,6 +203,12 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     number, of = int(np.sum(same)), len(rows)
     numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
     changed = np.any(numbers[1:] != numbers[:-1], axis=1)
+    if not number and np.std(steps) > STREAM.pace * np.median(steps) and np.mean(changed) <= STREAM.relayed:
+        repeats = [_held_over(column) for column in numbers.T if np.ptp(column)]
+        kept = ~np.all(repeats, axis=0) if repeats else np.ones(of, np.bool_)
+        if not np.all(kept):
+            relayed = Treated(Treatment.RELAYED, "", of - int(np.sum(kept)), of)
+            return _Timed(rows[kept], stamps[kept] / 1e9, (relayed,))
     twice = same & ~changed
     are_copies = bool(number) and np.array_equal(same, twice) and 2 * np.sum(changed) >= np.sum(~same)
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
