@@ -110,7 +110,7 @@ SENTENCES: Final = {  # by cause
     "task": "{reason}; the arm holds its position",
     "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "
     "arm; until then the arm moves back to where it touched nothing",
-    "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
+    "free_travel": "the arm has moved {travel} the force {since}; allowed: {allowed:g} m "
     "(limits.free_travel); the arm holds its position; end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
@@ -209,7 +209,9 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     push, ago = values.get("push"), values.get("ago", 0.0)
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
     is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
+    way = values.get("way", 0.0)
     found = {
+        "travel": f"{abs(way):.3g} m {'against' if way < 0.0 else 'along'}",
         "since": SINCE[has_touched],
         "reach": REACH[2 if is_pulled else has_touched],
         "calm": CALM[is_motors],

@@ -119,7 +119,7 @@ def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_sta
     for part in (
         "force_gain [0.5, 0.5, 0.5] is ",
         "times the largest linearly stable one",
-        "force along [0.343, 0, 0.939] in the base frame at 0.28 m of outer_link, posture [0, -1.8, 0, 1.45] rad",
+        "force along [0.343, 0, 0.939] in the base frame at 0.28 m along outer_link, posture [0, -1.8, 0, 1.45] rad",
         "domain beyond I",
         "allowed: ",
     ):

@@ -142,7 +142,7 @@ steps:
         ("torque: [0, 0, 0, 2]", "press not reached: force of joint 4: "),
         (
             "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
-            "press refused: force along (0, 0, -1) at 0.28 m of outer_link: 70 N is commanded; allowed: up to",
+            "press refused: force along (0, 0, -1) at 0.28 m along outer_link: 70 N is commanded; allowed: up to",
         ),
         ("torque: [0, 0, 0, 0]", ""),
     ],

@@ -47,7 +47,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 frequency = 1.0 / cycle.period
                 if found.origin not in (COMMANDED_CYCLE, HARMONIC):
                     size = f"{shown(frequency, 'Hz')}, {shown(cycle.peak_to_peak, unit)} peak to peak"
-                    verdict.append(f"{label}: {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
+                    verdict.append(f"{label} repeats at {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
                 findings += [
                     Finding(
                         f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=found.origin, error=found.error
@@ -75,7 +75,8 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
         COMMANDED_CYCLE: ", as it was commanded",
         HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion, "
         "which is not followed linearly",
-        UNKNOWN: "; its command is not known: name the topic with --command, or the column command.position.JOINT",
+        UNKNOWN: "; its command is not known: name its topic with --command; in a table, its column has to be "
+        "command.position.JOINT",
     }
     return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."
 

@@ -149,7 +149,8 @@ class CommandAdmission:
                 f"or (0, -x fz, x fy) for the contact position x; send joint torques on joint_torque_command"
             )
         if not 0.0 <= place <= length:
-            return f"torque {command.torque} N m pins the force at {place:.3g} m of {cover}; allowed: 0 to {length:g} m"
+            where = f"{place:.3g} m along {cover}; allowed: 0 to {length:g} m"
+            return f"torque {command.torque} N m pins the force at {where}"
         return ""
 
 

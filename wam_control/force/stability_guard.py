@@ -260,7 +260,7 @@ class StabilityGuard:
         node = self.node(contact)
         stiffness = float(series_stiffness(node.transmission_stiffness, node.contact_stiffness))
         along = f"force along {listed(contact.direction)} in the base frame"
-        where = f"{along} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
+        where = f"{along} at {contact.position:g} m along {contact.cover}, {posture_of(contact)}"
         domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
         found = GuardAssessment(domain, scale, stiffness, stiction_cycle(node, max(law.gain)), where, "")
         if domain is Domain.I:

@@ -69,7 +69,7 @@ class TaskAxis(NamedTuple):
             return f"{kind} of joint {self.joint + 1}"
         x, y, z = self.direction
         place = "the estimated position" if self.position is None else f"{self.position:.3g} m"
-        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place}{f' of {self.cover}' if self.cover else ''}"
+        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place}{f' along {self.cover}' if self.cover else ''}"
 
 
 class TaskCommand(NamedTuple):
