@@ -13,7 +13,7 @@
 - recorder, recorder_node, recorder_interface: every topic into a bag; recorded_stack: whether that is one run
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - long_steps: a node that holds up the others of its process
-- processors: one that the driver has to itself in realtime
+- processors: one for the inner loop in lockstep
 - process_signals: signals from the imports of a program to its end
 - conformance: a running driver tested against its contract; driver_bench: the node that does it
 - testing: the test kit; pytest_plugin: its fixtures

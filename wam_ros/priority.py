@@ -92,17 +92,6 @@ def set_priority(fifo: int, niceness: int) -> str:
     return USUAL
 
 
-def fifo_is_granted(fifo: int) -> bool:
-    """Whether the system grants a priority of SCHED_FIFO, which is not 0: this thread has it for a moment."""
-    before = os.sched_getscheduler(0), os.sched_getparam(0)
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(fifo))
-    except OSError:
-        return False
-    os.sched_setscheduler(0, *before)
-    return True
-
-
 def for_all_threads(ask: Callable[[int], None], but: str = " ") -> bool:
     """Ask for something for all threads of this process; whether it was granted to each that has not ended meanwhile.
 

@@ -5,9 +5,6 @@ to be woken itself and has nothing of the reader in its cache, and the writer is
 message to the next reader.  In lockstep, where the nodes wait for each other anyway, most of a period went into that.
 Here the inner loop has a processor, all others have the rest, and who reads waits until who writes has finished
 (SCHED_BATCH, which needs no right).  benchmarks/README.md shows the gain; the bits are the same.
-
-In realtime the driver works for most of a period.  Where three processors are permitted, its process has one to itself,
-and all others the rest.  benchmarks/README.md shows it.
 """
 
 import os
@@ -21,10 +18,9 @@ from typing import Final
 from wam_description.arm import Shared
 from wam_description.interface import declared, process_groups
 from wam_ros.limits import PROCESS_LIMITS
-from wam_ros.priority import fifo_is_granted, for_all_threads
+from wam_ros.priority import for_all_threads
 
-PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process by number, and a policy
-WAITING: Final = "batch"  # policy SCHED_BATCH
+PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process by number
 # share the driver's processor in lockstep where each node has a process: most of the messages are theirs
 CLOSEST: Final = {"transform", "velocity_loop", "gravity"}
 STATE: Final = Path("/proc/thread-self/stat")
@@ -34,29 +30,21 @@ PROCESSOR: Final = 36  # word of it behind the name of the thread
 def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[str, str]]]:
     """Entries of the parameter `nodes` that share a process, and its environment, in which it finds its processors.
 
-    In realtime that is empty where SCHED_FIFO is not granted, or fewer than three processors are permitted: then each
-    process may be anywhere.
+    That is empty in realtime, and for a process alone: it may be anywhere.
 
     Parameters
     ----------
     shared : shared parameters.
-    processes : GROUPED or EACH, of `wam_description.nodes`.
+    processes : ONE, GROUPED or EACH, of `wam_description.nodes`.
     """
     groups = process_groups(shared.nodes, processes)
-    permitted = os.sched_getaffinity(0)
-    if len(groups) == 1:
-        return [(groups[0], {})]
-    if shared.timing.mode == "lockstep":
-        closest, policy = CLOSEST, [WAITING]
-    elif len(permitted) >= PROCESS_LIMITS.processors and fifo_is_granted(shared.timing.fifo_priority):
-        closest, policy = set(), []
-    else:
+    if shared.timing.mode == "realtime" or len(groups) == 1:
         return [(group, {}) for group in groups]
-    inner = {idle_processor()}
-    idle, rest = (" ".join([*map(str, part), *policy]) for part in (inner, permitted - inner or inner))
+    permitted, inner = os.sched_getaffinity(0), {idle_processor()}
+    idle, rest = (" ".join(map(str, part)) for part in (inner, permitted - inner or inner))
     names = ({declared(entry).name for entry in group} for group in groups)
-    is_apart = ("driver" in group or group <= closest for group in names)
-    return [(group, {PROCESSORS: idle if one else rest}) for group, one in zip(groups, is_apart, strict=True)]
+    is_inner = ("driver" in group or group <= CLOSEST for group in names)
+    return [(group, {PROCESSORS: idle if one else rest}) for group, one in zip(groups, is_inner, strict=True)]
 
 
 def idle_processor() -> int:
@@ -72,12 +60,10 @@ def keep_to_processors(environment: MutableMapping[str, str]) -> None:
     """Keep all threads of this process to the processors that bring-up has given it, if it has."""
     # where the system permits others by now, it shares them out itself
     with suppress(OSError, KeyError, ValueError, OverflowError):
-        given = environment.pop(PROCESSORS).split()
-        processors = [int(one) for one in given if one != WAITING]
+        processors = [int(one) for one in environment.pop(PROCESSORS).split()]
 
         def keep(thread: int) -> None:
             os.sched_setaffinity(thread, processors)
-            if WAITING in given:
-                os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
+            os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
 
         for_all_threads(keep)
