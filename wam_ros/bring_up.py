@@ -139,42 +139,35 @@ class Processes(Closing):
 
         All processes but that of the recorder have one deadline together.
         """
-        deadline = time.monotonic() + PROCESS_LIMITS.end
-        before = self.ended()
+        before, deadline = self.ended(), time.monotonic() + PROCESS_LIMITS.end
         recorder = next((name for name, process in self.processes.items() if LAST in process.nodes), "")
         others = [name for name in self.processes if name != recorder]
-        first = [name for name in others if FIRST in self.processes[name].nodes]
         if any(code < 0 for code in before.values()):
             for process in self.processes.values():
                 process.send_signal(LISTENER_GONE)
-        for names in (first, others):
-            for name in names:
-                self.processes[name].terminate()
-            for name in names:
-                if not self.processes[name].has_ended(deadline - time.monotonic()):
-                    self._kill(name, "did not end")
-        if recorder:
-            self._end_recorder(recorder)
+        self._end([name for name in others if FIRST in self.processes[name].nodes], deadline)
+        self._end(others, deadline)
+        self._end([recorder] if recorder else [], time.monotonic() + PROCESS_LIMITS.recorder_end)
         code = self.ended().get(recorder, 0)
         if recorder not in before and code not in NO_FAILURE:
-            self.bag_failure = f"{process_of(recorder)} ended with code {code}; the bag may lack messages"
+            lacking = "the bag may lack messages; 'wam bag repair' closes it"
+            self.bag_failure = f"{process_of(recorder)} ended with code {code}; {lacking}"
         elif before.get(recorder) == 0 and others:
             self.bag_failure = "the recorder ended before the other nodes; the bag lacks what they published after it"
 
-    def _end_recorder(self, name: str) -> None:
-        begin, process = time.monotonic(), self.processes[name]
-        process.terminate()
-        while not process.has_ended(PROCESS_LIMITS.recorder_reports):
-            seconds = time.monotonic() - begin
-            if seconds > PROCESS_LIMITS.recorder_end:
-                self._kill(name, f"did not end within {seconds:.0f} s; 'wam bag repair' closes its bag")
-            else:
-                LOGGER.warning(f"waiting for the recorder to write the bag, {seconds:.0f} s")
-
-    def _kill(self, name: str, reason: str) -> None:
-        LOGGER.error(f"{process_of(name)} is killed: it {reason}")
-        self.killed.append(name)
-        self.processes[name].kill()
+    def _end(self, names: Sequence[str], deadline: float) -> None:
+        """End processes, after a time, s, the hard way."""
+        for name in names:
+            self.processes[name].terminate()
+        for name in names:
+            process = self.processes[name]
+            while not process.has_ended(min(deadline - time.monotonic(), PROCESS_LIMITS.end_reports)):
+                if time.monotonic() < deadline:
+                    LOGGER.warning(f"waiting for the end of {process_of(name)}")
+                    continue
+                LOGGER.error(f"{process_of(name)} is killed: it did not end in time")
+                self.killed.append(name)
+                process.kill()
 
 
 def process_of(nodes: str) -> str:

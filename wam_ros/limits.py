@@ -40,7 +40,7 @@ class ProcessLimits:
     short_delivery: float = 0.4  # s, where a listener was killed: the middleware waits for it as for one that is frozen
     end: float = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
     recorder_end: float = 120.0  # s, for a recorder to write its bag, usually less than one; a disk may have to wake up
-    recorder_reports: float = 2.0  # s between two lines about a recorder that is still writing
+    end_reports: float = 2.0  # s between two lines about a process that has not ended yet
     share: float = 0.8  # of a processor; a process that takes more leaves other programs no time, at its priority
     share_look: float = 2.0  # s, over which that is measured; the start takes less
     looks: int = 10  # for an idle processor

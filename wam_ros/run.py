@@ -69,15 +69,12 @@ def end_of_delivery(context: Context) -> float:
 
 def prepare_logging_directory() -> None:
     """Let rclpy log somewhere even where HOME is missing or cannot be written."""
-    if "ROS_LOG_DIR" in os.environ or "ROS_HOME" in os.environ:
-        return
-    if home := os.environ.get("HOME"):
-        directory = Path(home, ".ros", "log")
+    if not os.environ.keys() & {"ROS_LOG_DIR", "ROS_HOME"}:
+        directory = Path(os.environ.get("HOME", os.devnull), ".ros", "log")
         with contextlib.suppress(OSError):
             directory.mkdir(parents=True, exist_ok=True)
-            if os.access(directory, os.W_OK):
-                return
-    os.environ["ROS_LOG_DIR"] = str(Path(tempfile.gettempdir()) / f"wam_stack_log_{os.getuid()}")
+        if not os.access(directory, os.W_OK):
+            os.environ["ROS_LOG_DIR"] = str(Path(tempfile.gettempdir()) / f"wam_stack_log_{os.getuid()}")
 
 
 class Closing:

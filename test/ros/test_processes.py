@@ -164,7 +164,7 @@ def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -
     """A recorder as a process, with a bag that is open."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end=0.2))
-    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, recorder_reports=0.2))
+    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end_reports=0.2))
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
     wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
     return processes
@@ -183,7 +183,7 @@ def test_the_end_waits_for_a_recorder_that_is_slow_and_says_so(
     recording.close()
     assert recording.killed == []
     assert list(tmp_path.glob("bags/*/metadata.yaml"))
-    assert "waiting for the recorder to write the bag, " in capfd.readouterr().err
+    assert "waiting for the end of node recorder" in capfd.readouterr().err
 
 
 def catches_sigterm(pid: int) -> bool:
@@ -225,7 +225,7 @@ def test_a_recorder_that_does_not_end_is_killed_and_named(
     os.kill(pid_of(recording, "recorder"), signal.SIGSTOP)
     recording.close()
     assert recording.killed == ["recorder"]
-    assert "node recorder is killed: it did not end within" in capfd.readouterr().err
+    assert "node recorder is killed: it did not end in time" in capfd.readouterr().err
     (bag,) = tmp_path.glob("bags/*")
     assert not (bag / "metadata.yaml").exists()
     main_without_exit("bag", "repair", str(bag))
@@ -258,7 +258,7 @@ def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_
     assert processes.ended() == {"recorder": 0}
     assert list(tmp_path.glob("bags/*/metadata.yaml"))
     printed = capfd.readouterr().err.splitlines()
-    assert not [line for line in printed if "WARN" in line and "waiting for the recorder" not in line]  # a busy machine
+    assert not [line for line in printed if "WARN" in line and "waiting for the end" not in line]  # a busy machine
 
 
 def main_without_exit(*words: str) -> None:
