@@ -11,7 +11,7 @@ STOP: Final = 0.050  # s of the arm's time, from the newest state that was answe
 STATUS_AGE: Final = 0.25  # s, between two repetitions of the status
 REPLY: Final = 0.5  # s of the wall clock, for the driver to act on a service or on a status
 
-SENT: Final = ("motor_states", "motor_currents", "/clock", "robot_description")
+SENT: Final = ("motor_states", "motor_currents", "/clock", "robot_description", "/diagnostics")
 TAKEN: Final = ("motor_current_command",)
 SERVICES: Final = {"enable": True, "estop": False, "reset_fault": False}  # whether it is a SetBool, else a Trigger
 

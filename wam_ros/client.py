@@ -10,7 +10,7 @@ from typing import Any, Final
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from wam_description.arm import Shared
 from wam_description.interface import Interface
@@ -293,22 +293,19 @@ class StackClient(Closing):
         name, own = self.node.resolve_topic_name(topic), f"{self.node.get_namespace()}/"
 
         def kinds() -> list[str]:
-            return dict(self.node.get_topic_names_and_types()).get(name, []) if self._is_of_others(name) else []
+            return dict(self.node.get_topic_names_and_types()).get(name, [])
 
         def topics() -> list[str]:
             found = (name for name, _ in self.node.get_topic_names_and_types() if name.startswith(own))
-            visible = (name for name in found if "/_" not in name)  # others are hidden
-            return [name.removeprefix(own) for name in visible if self._is_of_others(name)]
+            # this program has one itself, others are hidden
+            return [name.removeprefix(own) for name in found if self.is_published(name) and "/_" not in name]
 
         last = time.monotonic()
         self._require(kinds, f"no topic {name}", topics, lambda: check(time.monotonic() - last))
         package, _, kind = kinds()[0].split("/")
         row = BY_NAME.get(topic)
-        profile = QoSProfile(depth=CALL_LIMITS.waiting, reliability=ReliabilityPolicy.BEST_EFFORT)
-        if row is not None and row.latched:
-            profile = listening(row)
-        elif row is None:
-            profile.durability = DurabilityPolicy.VOLATILE
+        newest = QoSProfile(depth=CALL_LIMITS.waiting, reliability=ReliabilityPolicy.BEST_EFFORT)
+        profile = listening(row) if row is not None and row.latched else newest
         taken: list[Any] = []
         subscription = self.node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), kind), name, taken.append, profile
@@ -328,11 +325,6 @@ class StackClient(Closing):
     def is_published(self, topic: str) -> bool:
         """Whether a node publishes a topic, named as for `messages`, at present."""
         return self.node.count_publishers(topic) > 0
-
-    def _is_of_others(self, topic: str) -> bool:
-        """Whether a node has a topic other than one that calls, as this one, which subscribes to the status."""
-        ends = (*self.node.get_publishers_info_by_topic(topic), *self.node.get_subscriptions_info_by_topic(topic))
-        return any(end.node_name != self.node.get_name() for end in ends)
 
     def _require(
         self,

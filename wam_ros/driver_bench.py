@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from wam_description.agreement import DIGESTS
@@ -16,7 +15,6 @@ from wam_description.driver_contract import REPLY, SENT, SERVICES, TAKEN, Driver
 from wam_description.event import Level
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State
-from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Call
@@ -24,7 +22,7 @@ from wam_ros.client import StackClient
 from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import diagnostic_status, joint_state, message_type
-from wam_ros.ros_topics import CLOCK, DIAGNOSTICS, NAMESPACE, qos, topic_name
+from wam_ros.ros_topics import CLOCK, NAMESPACE, qos, topic_name
 from wam_ros.wire import stamp_in
 
 KEPT = {"motor_states": " ".join(State._fields), "motor_currents": "effort"}  # arrays that must be filled
@@ -62,7 +60,6 @@ class DriverBench(StackClient):
     ----------
     arrived : what came by topic.
     reported : the driver's statuses and when they came, newest last.
-    diagnostics : names in /diagnostics so far.
     commanded : the currents of the last command, A, in the order of the motors.
     carrying : currents that hold the arm up, A.
     answered : stamp of the newest state that was answered, ns.
@@ -88,7 +85,6 @@ class DriverBench(StackClient):
         self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in (*KEPT, CLOCK)}
         self._refused = ""
         self.reported: deque[tuple[float, NodeStatus]] = deque(maxlen=CONFORMANCE_LIMITS.kept)
-        self.diagnostics: set[str] = set()
         self.answered = 0
         self.longest_pause = 0.0
         self.is_answering = True
@@ -100,7 +96,6 @@ class DriverBench(StackClient):
             self.listen(topic, partial(self._keep, topic), arrays, partial(self._refuse, topic))
         row, keep = BY_NAME[CLOCK], lambda data: self._keep(CLOCK, stamp_in(data), None)
         self.node.create_subscription(message_type(row), topic_name(self.node, row), keep, qos(row), raw=True)
-        self.node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._take_report, qos(BY_NAME[DIAGNOSTICS]))
         self.follow_statuses()
         self.lacking()  # of a service is there once there is a client
         self.report()
@@ -138,9 +133,6 @@ class DriverBench(StackClient):
             if status.session != self._session:
                 self._session = status.session
                 self.report()
-
-    def _take_report(self, message: Any) -> None:
-        self.diagnostics |= {status.name for status in message.status}
 
     def report(self, fault: str = "", node: str = "velocity_loop", started_with: str = "") -> None:
         """Publish a status of this node, or of another one: ready, or with a fault.
@@ -192,12 +184,11 @@ class DriverBench(StackClient):
 
     def lacking(self) -> list[str]:
         """What the driver does not connect to, of the topics that it sends and takes and of its services."""
-        node, name = self.node, diagnosed_name(self.node.get_namespace(), "driver")
+        node = self.node
         lacking = [topic for topic in SENT if not node.count_publishers(topic_name(node, BY_NAME[topic]))]
         lacking += [topic for topic in TAKEN if not self.publisher(topic).get_subscription_count()]
         lacking += [f"driver/{name}" for name in SERVICES if not self.service(_call(name))[0].service_is_ready()]
-        lacking += [STATUS] * (not self.reported)
-        return lacking + [f"/diagnostics of '{name}'"] * (name not in self.diagnostics)
+        return lacking + [STATUS] * (not self.reported)
 
     def second_publisher(self) -> Any:
         """Another publisher of the command, of a node of its own, and what ends it."""
