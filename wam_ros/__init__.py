@@ -10,7 +10,7 @@
 - local_bus: messages between nodes of one process, without the middleware
 - ros_parameters: declared, described, live; remote_parameters: those of other nodes
 - requests: requests to services and their answers; client: a running stack as a program next to it sees it
-- recorder, recorder_node, recorder_interface: every topic into a bag; recorded_stack: whether that is one run
+- recorder, recorder_node, recorder_interface: every topic of one run into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - long_steps: a node that holds up the others of its process
 - processors: one for the inner loop in lockstep

@@ -14,11 +14,10 @@ from wam_ros.inlets import Inlets
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.network import Place, require_name
+from wam_ros.network import Place
 from wam_ros.outlets import Outlets
 from wam_ros.priority import OWN, PRIORITY
 from wam_ros.ros_parameters import declare
-from wam_ros.ros_topics import DIAGNOSTICS
 from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import status_of
 
@@ -86,16 +85,15 @@ class StackNode(TolerantNode):
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration.name, **ros)
-        require_name(self, declaration.name)
         self.shared, self.own = declare(self, declaration.parameter_class)
         if self.is_alone:
             self._place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
         self.interface = Interface(self.shared, started_by_hand=declaration)
         topics = self.interface.topics
         rows = [topics[topic] for topic in declaration.outputs if topic in topics]
-        self.outlets = Outlets(self, rows, [topics[STATUS], topics[DIAGNOSTICS]], self.shared)
-        self.health = Health(self, self.outlets, self.shared)
-        self.inlets = Inlets(self, self.interface, self.shared, self.health, self.outlets.bus)
+        self.outlets = Outlets(self, rows)
+        self.health = Health(self)
+        self.inlets = Inlets(self)
         self.peers = Peers(set(self.interface.names) - {declaration.name})
         self.inlets.listen(STATUS, self._hear)
         self._readiness = self.create_timer(0.02, self._look_for_peers)

@@ -10,7 +10,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from wam_bag.printable import printable
 from wam_description.agreement import DIGESTS, digests
-from wam_description.arm import Shared
 from wam_description.event import Code, Event, Level, fault
 from wam_description.event_text import sentence
 from wam_description.parameters import listed
@@ -20,7 +19,6 @@ from wam_description.topics import STATUS
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS, LongStep
 from wam_ros.messages import diagnostic_status
-from wam_ros.outlets import Outlets
 from wam_ros.ros_topics import DIAGNOSTICS, SECOND, header
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
@@ -58,9 +56,7 @@ class Health:
 
     Parameters
     ----------
-    node : the ROS node; its `take_problem` is called with a new problem.
-    outlets : of the node.
-    shared : the shared configuration.
+    node : a `wam_ros.connections.StackNode`; its `take_problem` is called with a new problem.
 
     Attributes
     ----------
@@ -74,11 +70,11 @@ class Health:
     is_ready : whether every expected peer is connected.
     """
 
-    def __init__(self, node: Any, outlets: Outlets, shared: Shared) -> None:
-        self._node, self._outlets, self._shared = node, outlets, shared
+    def __init__(self, node: Any) -> None:
+        self._node = node
         self.status = self.plain = WAITING
         self.counts: Counter[str] = Counter()
-        self.digests = digests(shared)
+        self.digests = digests(node.shared)
         self.problems: dict[str, Event] = {}
         self.refusals = defaultdict[str, Refusal](Refusal)
         self._defects = {Code.REFUSED: self.refusals, Code.UNSTAMPED: defaultdict[str, Refusal](Refusal)}
@@ -102,9 +98,9 @@ class Health:
             status = status._replace(level=Level.ERROR, message=self.problem, fault=self.problem, events=events)
         status = self._whole(status._replace(session=status.session or self.session))
         if status != self.status:
-            if self._shared.timing.mode == "lockstep" or status.session != self.status.session:
+            if self._node.shared.timing.mode == "lockstep" or status.session != self.status.session:
                 # only the last status is kept: a recording, and a driver that is followed, lack none
-                self._outlets.is_taken(STATUS, NODE_LIMITS.status_echo)
+                self._node.outlets.is_taken(STATUS, NODE_LIMITS.status_echo)
             self.status = status
             self._send(status)
 
@@ -118,7 +114,7 @@ class Health:
         return status._replace(node=self._node.get_name(), connected=self.is_ready, facts=facts)
 
     def _send(self, status: NodeStatus) -> None:
-        self._outlets.send(STATUS, diagnostic_status(status, self._shared.arm.name))
+        self._node.outlets.send(STATUS, diagnostic_status(status, self._node.shared.arm.name))
 
     def repeat(self) -> None:
         """Publish the present status once more, as a message may be lost on a loaded machine."""
@@ -130,7 +126,7 @@ class Health:
         One that a frozen node does not take holds up the others no longer than `NODE_LIMITS.status_on_its_way`.
         """
         now = time.monotonic()
-        if now - self._repeated > NODE_LIMITS.status_on_its_way or self._outlets.is_taken(STATUS):
+        if now - self._repeated > NODE_LIMITS.status_on_its_way or self._node.outlets.is_taken(STATUS):
             self._repeated = now
             self.repeat()
 
@@ -247,7 +243,7 @@ class Health:
 
     def _report(self, **more: str) -> None:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""
-        node, outlets = self._node, self._outlets
+        node, outlets = self._node, self._node.outlets
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
         refused = {
             f"{code.words} on {topic}": one.count
@@ -260,5 +256,5 @@ class Health:
         facts |= {**self.facts, **more}
         name, present = diagnosed_name(node.get_namespace(), node.get_name()), self.status
         status = NodeStatus(present.level, present.message, name, self.is_ready, fault=present.fault, facts=facts)
-        message = diagnostic_status(status, self._shared.arm.name)
+        message = diagnostic_status(status, self._node.shared.arm.name)
         outlets.send(DIAGNOSTICS, DiagnosticArray(header=header(self._last), status=[message]))

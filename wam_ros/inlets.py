@@ -5,13 +5,9 @@ from typing import Any
 
 from rclpy.subscription import Subscription
 
-from wam_description.arm import Shared
 from wam_description.event import Event, fault
 from wam_description.event_text import sentence
-from wam_description.interface import Interface
-from wam_ros.health import Health
 from wam_ros.limits import NODE_LIMITS
-from wam_ros.local_bus import LocalBus
 from wam_ros.messages import Refused, message_type
 from wam_ros.ros_topics import listening, topic_name
 from wam_ros.tolerance import TolerantNode
@@ -80,11 +76,7 @@ class Inlets:
 
     Parameters
     ----------
-    node : the ROS node.
-    interface : of the bring-up.
-    shared : the shared configuration.
-    health : of the node; it reports what is refused.
-    bus : that carries messages within the process, None where none does.
+    node : a `wam_ros.connections.StackNode`, whose health reports what is refused.
 
     Attributes
     ----------
@@ -92,11 +84,8 @@ class Inlets:
     claims : who publishes each topic that is fed, by topic.
     """
 
-    def __init__(
-        self, node: TolerantNode, interface: Interface, shared: Shared, health: Health, bus: LocalBus | None
-    ) -> None:
-        self._node, self._interface, self._shared = node, interface, shared
-        self._health, self._bus = health, bus
+    def __init__(self, node: Any) -> None:
+        self._node = node
         self.subscriptions: dict[str, Subscription] = {}
         self.claims: dict[str, PublisherClaim] = {}
         node.create_timer(NODE_LIMITS.claim_period, self._look_at_all)
@@ -117,31 +106,32 @@ class Inlets:
         arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
         accepts : whether a message of a stamp is of interest; others are not decoded.
         """
-        decode = decoder(self._interface.topics[topic], self._shared, arrays)
-        problems = self._health.problems
+        node, health = self._node, self._node.health
+        decode = decoder(node.interface.topics[topic], node.shared, arrays)
 
         def receive(data: bytes) -> None:
             try:
                 # what a second publisher sends does not come by the bus
-                if (topic in problems or (not is_local and claim.count > 1)) and (rivals := self._look(topic)):
+                if (topic in health.problems or (not is_local and claim.count > 1)) and (rivals := self._look(topic)):
                     raise Refused(sentence(rivals))
                 stamp = stamp_in(data)
                 if accepts(stamp):
                     take(stamp, decode(data))
             except Refused as reason:
-                self._health.refuse(topic, str(reason), reason.is_late)
+                health.refuse(topic, str(reason), reason.is_late)
 
         is_local = self.listen(topic, receive)
-        self.claims[topic] = claim = PublisherClaim(self._node, topic, self.subscriptions[topic])
+        self.claims[topic] = claim = PublisherClaim(node, topic, self.subscriptions[topic])
 
     def listen(self, topic: str, receive: Callable[[bytes], None]) -> bool:
         """Subscribe to the bytes of messages; whether they come without the middleware, see `wam_ros.local_bus`."""
-        node, row, bus = self._node, self._interface.topics[topic], self._bus
+        node, bus = self._node, self._node.outlets.bus
+        row = node.interface.topics[topic]
         profile, name = listening(row), topic_name(node, row)
-        if not row.latched and self._shared.timing.mode == "realtime":
+        if not row.latched and node.shared.timing.mode == "realtime":
             profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
-        is_local = bus is not None and not row.latched and bus.carries(self._interface.publishers(topic))
-        if bus is not None and is_local:
+        is_local = bus is not None and not row.latched and bus.carries(node.interface.publishers(topic))
+        if is_local:
             bus.subscribe(node.resolve_topic_name(name), node.bearing(receive, f"a message on {topic}"))
             profile.depth = 1
         subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
@@ -152,7 +142,7 @@ class Inlets:
 
     def _look(self, topic: str) -> Event | None:
         rivals = self.claims[topic].rivals()
-        self._health.set_problem(topic, rivals)
+        self._node.health.set_problem(topic, rivals)
         return rivals
 
     def _look_at_all(self) -> None:

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Iterable, MutableMapping
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from wam_description.parameters import ParameterError
 
@@ -82,22 +82,6 @@ class Place:
     def close(self) -> None:
         """Release the place."""
         self._socket.close()
-
-
-def require_name(node: Any, name: str) -> None:
-    """Refuse a node that was renamed: the others find it, and it finds its parameters, by its name.
-
-    Raises
-    ------
-    ParameterError
-        with what to do instead.
-    """
-    if node.get_name() != name:
-        raise ParameterError(
-            f"node '{name}' was renamed '{node.get_name()}'; other nodes and its parameters use the name '{name}': "
-            f"leave out -r __node:={node.get_name()}, and give the nodes of a second arm a namespace instead: "
-            "-r __ns:=/other"
-        )
 
 
 def require_places(names: Iterable[str], namespace: str) -> None:

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from wam_description.arm import Shared
-from wam_description.topics import Topic
+from wam_description.topics import BY_NAME, EVERY_NODE, Topic
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
 from wam_ros.ros_topics import qos, topic_name
@@ -22,10 +20,8 @@ class Outlets:
 
     Parameters
     ----------
-    node : the ROS node.
+    node : a `wam_ros.connections.StackNode`.
     rows : topics of the table that the node publishes as values.
-    own : topics on which each node publishes messages.
-    shared : the shared configuration.
 
     Attributes
     ----------
@@ -34,14 +30,14 @@ class Outlets:
     full : full name of each topic.
     """
 
-    def __init__(self, node: Node, rows: Sequence[Topic], own: Sequence[Topic], shared: Shared) -> None:
+    def __init__(self, node: Any, rows: Sequence[Topic]) -> None:
         self._node = node
-        self.bus = BUSES.get(node.context) if shared.timing.mode == "lockstep" else None
-        every = [*rows, *own]
+        self.bus = BUSES.get(node.context) if node.shared.timing.mode == "lockstep" else None
+        every = [*rows, *(BY_NAME[name] for name in EVERY_NODE)]  # on these each node publishes messages
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
         }
-        self._encoders = {row.name: encoder(row, shared) for row in rows}
+        self._encoders = {row.name: encoder(row, node.shared) for row in rows}
         self.published = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
 

@@ -1,6 +1,7 @@
 """Node `recorder`: writes every topic of the interface table to a bag, with the parameters of all nodes."""
 
 import time
+from collections.abc import Mapping
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -9,19 +10,20 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from wam_bag.bag_name import dated
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
+from wam_description.agreement import OF_ONE_PROCESS
 from wam_description.event import RAISED, Level
 from wam_description.interface import declared
 from wam_description.parameters import ParameterError, values
 from wam_description.signals import NodeStatus
-from wam_description.topics import DEPTH, EVERY_NODE, STATUS, Topic
+from wam_description.topics import DEPTH, STATUS, Topic
 from wam_description.yaml_text import parameter_text
 from wam_ros.connections import StackNode
 from wam_ros.health import ENDED, NODE, PUBLISHED, problem_of
 from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import Refused, message_type, read_status
-from wam_ros.recorded_stack import RecordedStack
 from wam_ros.recorder import Recorder
 from wam_ros.recorder_interface import EVERY, RecorderInterface
+from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.ros_topics import DIAGNOSTICS, listening, topic_name
 from wam_ros.wire import deserialized
 
@@ -45,16 +47,14 @@ class RecorderNode(StackNode):
         topics = {self.resolve_topic_name(topic_name(self, topic)): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, self._writers, self.get_namespace())
-        self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
         stampless_first = sorted(topics.items(), key=lambda item: not item[1].latched)
         self._drained = {name: self._listen(name, topic) for name, topic in stampless_first}
         self._ends_last = RECORDER in interface.names  # one that was started by hand may end before the others
         self._unfinished = set(self.peers.names) if self._ends_last else set()  # nodes without a final count
-        self.stack = RecordedStack(self, shared, self.peers.names, str(self.bag.path))
+        self.stack = RecordedStack(self)
         self._attached = ""
-        self._has_heard = False  # others, recorded or not
         self.create_timer(RECORDER_LIMITS.drain_period, self._drain)
         self.create_timer(0.1, self.attend)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
@@ -79,7 +79,7 @@ class RecorderNode(StackNode):
     @property
     def _empty(self) -> str:
         """That no message of the stack has come to a recorder that was started by hand; '' where one has."""
-        if self._ends_last or self._has_heard:
+        if self._ends_last or any(count.publisher != RECORDER for count in self.recorder.counts()):
             return ""
         return f"{self.bag.path} is empty: no message came; start the stack with 'wam up' before the recorder"
 
@@ -171,7 +171,6 @@ class RecorderNode(StackNode):
                     arrived.append((info["source_timestamp"], name, data, received, number))
         arrived.sort(key=itemgetter(0))
         for sent, name, data, received, number in arrived:
-            self._has_heard |= name not in self._own_topics
             self.recorder.receive(name, data, received, sent, number)
             if name == self.outlets.full[DIAGNOSTICS]:
                 self._take_totals(data)
@@ -197,3 +196,71 @@ class RecorderNode(StackNode):
             self.get_logger().warning(f"{self.bag.path}: {counts}")
         else:
             self.get_logger().info(f"{self.bag.path}: {counts}")
+
+
+class RecordedStack:
+    """The nodes that a recorder records: their parameters, and whether one differs or was started again.
+
+    A bag has one run.
+
+    Parameters
+    ----------
+    recorder : which asks.
+
+    Attributes
+    ----------
+    failure : how a node runs otherwise than the recorder takes it to, or that there are two runs; '' where neither.
+    parameters : of the nodes.
+    restarted : nodes that were started again and whose parameters have been requested.
+    """
+
+    def __init__(self, recorder: "RecorderNode") -> None:
+        self._recorder = recorder
+        self.parameters = RemoteParameters(recorder, recorder.peers.names)
+        self.restarted: dict[str, RemoteParameters] = {}
+        self.failure = ""
+        self._compared: set[str] = set()  # nodes
+        self._lives: dict[str, str] = {}  # the node of each writer of a status that was seen
+
+    def attend(self, writers: Mapping[str, str]) -> None:
+        """Ask for parameters and look at those that came; `writers` are the nodes of the statuses by identity."""
+        self.parameters.ask()
+        for node in self.parameters.found.keys() - self._compared:
+            self._compared.add(node)
+            self._note(self._difference(node))
+        for writer, node in writers.items():
+            if writer not in self._lives and node in self._lives.values() and node in self.parameters.found:
+                self.restarted[node] = RemoteParameters(self._recorder, [node])
+            self._lives[writer] = node
+        for node, again in list(self.restarted.items()):
+            if again.complete():
+                del self.restarted[node]
+                self._note(self._change(node, again.found[node]))
+
+    def _note(self, failure: str) -> None:
+        if failure and not self.failure:
+            self.failure = failure
+            self._recorder.get_logger().error(failure)
+
+    def _difference(self, node: str) -> str:
+        """How a node has another mode or list of nodes than the recorder was given."""
+        given, shared = self.parameters.found[node], self._recorder.shared
+        own, mode = shared.timing.mode, given.get("timing.mode", shared.timing.mode)
+        others = set(shared.nodes).symmetric_difference(given.get("nodes", shared.nodes)) - {RECORDER}
+        found = [f"node {node} runs in {mode}, and this recorder in {own}"] * (mode != own)
+        only = ", ".join(sorted(others))
+        found += [f"only one of node {node} and this recorder has {only} in 'nodes'"] * bool(others)
+        advice = "start the recorder with 'wam bag record', which takes both from the running stack"
+        return "; ".join([*found, advice]) if found else ""
+
+    def _change(self, node: str, after: Mapping[str, object]) -> str:
+        """That a node was started again with other parameters than those in the bag, '' where it was not."""
+        before = self.parameters.found[node]
+        others = [name for name in before.keys() - OF_ONE_PROCESS if str(before[name]) != str(after.get(name))]
+        if not others:
+            return ""
+        bag = self._recorder.bag.path
+        return (
+            f"node {node} was started again, with another {', '.join(sorted(others))}, and {bag} has both runs; record "
+            "each with a recorder of its own"
+        )

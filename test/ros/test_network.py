@@ -337,8 +337,7 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     ("name", "more", "text"),
     [
         ("driver", (), r"node 'driver' already runs in namespace /wam .* \(process \d+\); stop it"),
-        ("driver", ("-r", "__node:=other"), "node 'driver' was renamed 'other'; .* namespace instead: -r __ns:=/other"),
-        ("recorder", ("-r", "__node:=other"), "node 'recorder' was renamed 'other'; other nodes and its parameters"),
+        ("driver", ("-r", "__node:=other"), r"node 'other', section '/\*\*/other' .*: missing parameter"),
     ],
 )
 def test_a_node_that_runs_already_or_was_renamed_is_refused(
