@@ -114,9 +114,9 @@ def occupant(domain: int, namespace: str, name: str) -> int:
         return int(pid)
 
 
-def requested_domain(environment: MutableMapping[str, str] = os.environ) -> int:
+def requested_domain() -> int:
     """The ROS domain of the environment; ROS itself refuses what is no number."""
-    text = environment.get("ROS_DOMAIN_ID", "")
+    text = os.environ.get("ROS_DOMAIN_ID", "")
     return int(text) if text.isascii() and text.isdigit() else 0
 
 

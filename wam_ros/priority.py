@@ -29,30 +29,21 @@ class Priority:
     A process that is too slow for realtime would never do so, and no program of the operator could begin, not even one
     that calls the e-stop.
 
-    Parameters
-    ----------
-    clock, used : s; time, and processor time of this process.
-
     Attributes
     ----------
     granted : for people.
     """
 
-    def __init__(
-        self, clock: Callable[[], float] = time.monotonic, used: Callable[[], float] = time.process_time
-    ) -> None:
-        self._clock, self._used = clock, used
-        self.granted = USUAL
-        self._then = clock(), used()
+    granted = USUAL
+    _then = 0.0, 0.0  # as `spent`
 
     def ask(self, fifo: int, niceness: int) -> None:
         """As `set_priority`."""
-        self.granted = set_priority(fifo, niceness)
-        self._then = self._clock(), self._used()
+        self.granted, self._then = set_priority(fifo, niceness), spent()
 
     def look(self) -> bool:
         """Give the priority back, where the process took too much of a processor; whether this happened now."""
-        (then, used), now = self._then, (self._clock(), self._used())
+        (then, used), now = self._then, spent()
         if self.granted == USUAL or now[0] - then < PROCESS_LIMITS.share_look:
             return False
         self._then, share = now, (now[1] - used) / (now[0] - then)
@@ -65,6 +56,11 @@ class Priority:
 
 
 OWN: Final = Priority()
+
+
+def spent() -> tuple[float, float]:
+    """The time, and the processor time of this process, s."""
+    return time.monotonic(), time.process_time()
 
 
 def _as_usual(thread: int) -> None:

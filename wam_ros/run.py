@@ -5,7 +5,6 @@ import ctypes
 import gc
 import os
 import signal
-import sys
 import tempfile
 import threading
 import time
@@ -191,13 +190,13 @@ class Nodes(Connection):
             raise
 
 
-def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) -> None:
+def run(makers: Mapping[str, MakeNode], arguments: Sequence[str]) -> None:
     """Run nodes as this process, until SIGINT, SIGTERM or until the attribute `done` of one is true.
 
     Parameters
     ----------
     makers : what makes each node, by its name; called with ``context`` and ``namespace``.
-    arguments : command line, sys.argv where None.
+    arguments : command line.
 
     Raises
     ------
@@ -206,14 +205,15 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     """
     die_with_parent()
     stop = Stop()
-    given = list(sys.argv if arguments is None else arguments)
     try:
-        connection = Nodes(makers, given)
+        connection = Nodes(makers, arguments)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     except RuntimeError as error:  # also security that is enforced where the middleware has none
         reason = " ".join(str(error).split())
-        raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
+        raise SystemExit(
+            f"error: ROS does not start with {' '.join(arguments[1:]) or 'no arguments'}: {reason}"
+        ) from None
     nodes = connection.nodes
 
     def end() -> None:

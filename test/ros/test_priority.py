@@ -38,9 +38,10 @@ print(SESSION.read_text().split()[-1] if SESSION.exists() else 0)
 
 GIVEN_BACK = """
 import os, sys
-from wam_ros.priority import Priority
-ticks = iter((0.0, 0.0, 0.0, 0.0, 1.0, 1.9, 2.1, float(sys.argv[1])))
-own = Priority(lambda: next(ticks), lambda: next(ticks))
+from wam_ros import priority
+ticks = iter(((0.0, 0.0), (1.0, 1.9), (2.1, float(sys.argv[1]))))
+priority.spent = lambda: next(ticks)
+own = priority.Priority()
 before = os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)
 own.ask(10, -15)
 print(own.granted)

@@ -491,7 +491,7 @@ class Sender(Node):
         print(end_of_delivery(self.context) - time.monotonic() <= PROCESS_LIMITS.short_delivery)
         super().destroy_node()
 
-run({"sender": Sender})
+run({"sender": Sender}, ["wam"])
 """
 
 
