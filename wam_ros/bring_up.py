@@ -17,10 +17,10 @@ from wam_description.nodes import EACH
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.network import require_places
 from wam_ros.node import node_makers, parameter_file
-from wam_ros.process_signals import HELD_UP, LISTENER_GONE
+from wam_ros.process_signals import HELD_UP, LISTENER_GONE, Stop
 from wam_ros.processors import placed_groups
 from wam_ros.ros_topics import NAMESPACE
-from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory
+from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory, run
 
 LOGGER: Final = get_logger("wam")
 # codes of a recorder whose bag is whole, or that SIGTERM ended before it had one
@@ -55,9 +55,8 @@ class NodeProcess(subprocess.Popen[bytes]):
         self.nodes = [declared(entry).name for entry in entries]
         environment = {**os.environ, PARENT: str(os.getpid()), **place}
         with parameter_file(configuration) as file:
-            command = [sys.executable, "-m", "wam_cli.program", "node", *entries, "--ros-args"]
-            command += ["--params-file", f"/dev/fd/{file.name}", "-r", f"__ns:=/{namespace.strip('/')}"]
-            command += ["--log-level", log_level]
+            command = [sys.executable, "-m", "wam_cli.program", "node", *entries]
+            command += _arguments(f"/dev/fd/{file.name}", namespace, log_level)
             super().__init__(command, start_new_session=True, env=environment, pass_fds=[int(file.name)])
 
     def has_ended(self, seconds: float) -> bool:
@@ -80,6 +79,31 @@ class NodeProcess(subprocess.Popen[bytes]):
             self.kill()
 
 
+def _arguments(file: str, namespace: str, log_level: str) -> list[str]:
+    """The arguments of ROS for nodes with the parameters in a file."""
+    where = f"__ns:=/{namespace.strip('/')}"
+    return ["--ros-args", "--params-file", file, "-r", where, "--log-level", log_level]
+
+
+def run_together(
+    configuration: Configuration,
+    namespace: str,
+    log_level: str,
+    stop: Stop,
+    before_end: Callable[[], object],
+) -> str:
+    """Run the nodes of a configuration as this process; see `Processes` and `run`."""
+    _require_start(configuration, namespace)
+    makers = node_makers(configuration.shared.nodes)
+    with parameter_file(configuration) as file:
+        return run(makers, ["wam", *_arguments(str(file), namespace, log_level)], stop, before_end)
+
+
+def _require_start(configuration: Configuration, namespace: str) -> None:
+    require_places([declared(entry).name for entry in configuration.shared.nodes], namespace)
+    require_parameters(configuration)
+
+
 class Processes(Closing):
     """Nodes in processes of their own; leaving the context stops them all, brakes first, bag last.
 
@@ -88,7 +112,7 @@ class Processes(Closing):
     configuration : values for all nodes; its `shared.nodes` names which ones are started.
     namespace : namespace of the nodes.
     log_level : least severity of what they print.
-    processes : ONE, GROUPED or EACH, of `wam_description.nodes`; a process of several nodes is named for all of them.
+    processes : GROUPED or EACH, of `wam_description.nodes`; a process of several nodes is named for all of them.
 
     Attributes
     ----------
@@ -111,8 +135,7 @@ class Processes(Closing):
         log_level: str = "info",
         processes: str = EACH,
     ) -> None:
-        require_places([declared(entry).name for entry in configuration.shared.nodes], namespace)
-        require_parameters(configuration)
+        _require_start(configuration, namespace)
         self.killed: list[str] = []
         groups = placed_groups(configuration.shared, processes)
         started = [NodeProcess(configuration, group, namespace, log_level, place) for group, place in groups]

@@ -190,21 +190,32 @@ class Nodes(Connection):
             raise
 
 
-def run(makers: Mapping[str, MakeNode], arguments: Sequence[str]) -> None:
+def run(
+    makers: Mapping[str, MakeNode],
+    arguments: Sequence[str],
+    stop: Stop | None = None,
+    before_end: Callable[[], object] = lambda: None,
+) -> str:
     """Run nodes as this process, until SIGINT, SIGTERM or until the attribute `done` of one is true.
 
     Parameters
     ----------
     makers : what makes each node, by its name; called with ``context`` and ``namespace``.
     arguments : command line.
+    stop : that the signals set.
+    before_end : called before the nodes end.
+
+    Returns
+    -------
+    The `failure` of a node, '' where none has one.
 
     Raises
     ------
     SystemExit
-        with code 1 where the ROS arguments or the parameters are refused or a node has a `failure`.
+        with code 1 where the ROS arguments or the parameters are refused.
     """
     die_with_parent()
-    stop = Stop()
+    stop = stop or Stop()
     try:
         connection = Nodes(makers, arguments)
     except ParameterError as error:
@@ -232,9 +243,9 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str]) -> None:
             getattr(node, "raise_priority", lambda: None)()
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         connection.spin(is_over, end)
+        before_end()
         bound_leaving(connection.context, lambda: _failure(nodes.values()))
-    if reason := _failure(nodes.values()):
-        raise SystemExit(f"error: {reason}")
+    return _failure(nodes.values())
 
 
 def _failure(nodes: Iterable[Node]) -> str:

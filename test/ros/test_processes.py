@@ -103,7 +103,7 @@ def up(started: Callable[..., Stack], *arguments: str) -> Stack:
     stack = started("-m", "wam_cli.main", "up", "--record", *arguments)
     wait(lambda: recorded(stack) > 100_000, f"a bag that grows; {stack.said()}")
     in_groups = GROUPED in arguments or "--realtime" in arguments
-    others = 3 if in_groups else NODES if "--processes" in arguments else 1
+    others = 3 if in_groups else NODES if "--processes" in arguments else 0
     assert len(stack.alive()) == others + 1
     return stack
 

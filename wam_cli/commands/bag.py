@@ -66,7 +66,9 @@ def _record(given: argparse.Namespace) -> None:
     print(f"the stack in /{given.namespace} runs in {shared.timing.mode}: {', '.join(nodes)}", flush=True)
     with parameter_file(_of_stack(configuration, shared)) as file:
         where = f"__ns:=/{given.namespace}"
-        run_node(node_makers([RECORDER]), ["wam", "--ros-args", "--params-file", str(file), "-r", where])
+        arguments = ["wam", "--ros-args", "--params-file", str(file), "-r", where]
+        if failure := run_node(node_makers([RECORDER]), arguments):
+            raise SystemExit(f"error: {failure}")
 
 
 def _of_stack(configuration: Configuration, shared: Shared) -> Configuration:

@@ -212,18 +212,21 @@ def _stated(seconds: float, step: str) -> None:
 
 def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> PlayedDemo:
     from wam_cli.commands.live import page_next_to
-    from wam_ros.bring_up import Processes
+    from wam_ros.bring_up import Processes, run_together
     from wam_ros.ros_topics import NAMESPACE
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
-    stop = Stop()
-    with (
-        page_next_to(given, NAMESPACE, lambda: stop.is_set) as close_page,
-        Processes(configuration, processes=processes_of(configuration, given)) as stack,
-    ):
-        stack.wait(lambda ended: stop.is_set or bool(ended))
-        failures = stack.failures
-        for failure in failures:  # before the others end and print what follows from it
-            print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
-        close_page()
-    return PlayedDemo([*failures, *([stack.bag_failure] if stack.bag_failure else [])], stop.is_set)
+    stop, processes = Stop(), processes_of(configuration, given)
+    failures: list[str] = []
+    with page_next_to(given, NAMESPACE, lambda: stop.is_set) as close_page:
+        if processes == ONE:
+            last = run_together(configuration, NAMESPACE, "info", stop, close_page)
+        else:
+            with Processes(configuration, processes=processes) as stack:
+                stack.wait(lambda ended: stop.is_set or bool(ended))
+                failures += stack.failures
+                for failure in failures:  # before the others end and print what follows from it
+                    print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
+                close_page()
+            last = stack.bag_failure
+    return PlayedDemo([*failures, *([last] if last else [])], stop.is_set)

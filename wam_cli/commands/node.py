@@ -30,5 +30,6 @@ def run(given: argparse.Namespace) -> int:
     is_of_ros = PARAMETERS in given.ros and given.config == BASE_CONFIGURATION and not given.values
     with parameter_file(configuration_of(given)) as file:
         own = [] if is_of_ros else [PARAMETERS, str(file)]
-        run_node(makers, ["wam", "--ros-args", *own, *given.ros])
+        if failure := run_node(makers, ["wam", "--ros-args", *own, *given.ros]):
+            raise SystemExit(f"error: {failure}")
     return 0

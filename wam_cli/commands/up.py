@@ -18,7 +18,9 @@ from wam_cli.options import (
     timed,
 )
 from wam_control.task.scenario import load_for
-from wam_ros.bring_up import Processes, process_of
+from wam_description.interface import Interface
+from wam_description.nodes import ONE
+from wam_ros.bring_up import Processes, process_of, run_together
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_ros.run import die_with_parent
 
@@ -62,27 +64,33 @@ def run(given: argparse.Namespace) -> int:
             )
     stop = Stop()
     processes = processes_of(configuration, given)
-    with (
-        page_next_to(given, given.namespace, lambda: stop.is_set) as close_page,
-        Processes(configuration, given.namespace, given.log_level, processes) as stack,
-    ):
-        each = stack.processes
-        if not stop.is_set:
-            where = f"{len(each)} processes ({'; '.join(each)})" if len(each) > 1 else "one process"
-            print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
-        ended = stack.wait(lambda ended: stop.is_set or bool(ended))
-        for failure in stack.failures:
-            print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
-        close_page()
+    killed: list[str] = []
+    with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
+        started = f"{len(configuration.shared.nodes)} nodes started in"
+        if processes == ONE:
+            print(f"{started} this process; Ctrl-C stops them", flush=True)
+            failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)
+            names = ", ".join(Interface(configuration.shared).names)
+            ended = {} if stop.is_set else {names: int(bool(failure))}
+        else:
+            with Processes(configuration, given.namespace, given.log_level, processes) as stack:
+                each = stack.processes
+                if not stop.is_set:
+                    print(f"{started} {len(each)} processes ({'; '.join(each)}); Ctrl-C stops them", flush=True)
+                ended = stack.wait(lambda ended: stop.is_set or bool(ended))
+                for failure in stack.failures:
+                    print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
+                close_page()
+            failure, killed = stack.bag_failure, stack.killed
     is_played = False
     for process, code in ended.items():
-        is_scenario = "scenario" in each[process].nodes
+        is_scenario = "scenario" in process.split(", ")
         is_played |= is_scenario
         who = "the scenario" if is_scenario else process_of(process)
         print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
     if given.scenario and is_played and not any(ended.values()):
         seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
         print(f"to see whether its commands were carried out: {seen}")
-    if stack.bag_failure:
-        print(f"error: {stack.bag_failure}", file=sys.stderr)
-    return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed or stack.bag_failure))
+    if failure:
+        print(f"error: {failure}", file=sys.stderr)
+    return max([abs(code) for code in ended.values()], default=0) or int(bool(killed or failure))
