@@ -283,7 +283,7 @@ def recorded_range(configuration: Configuration) -> str:
         (row.quantity, abs(row.deviation * float(row.predicted))) for row in rows if row.quantity.endswith("true")
     ]
     shown = [(name.removesuffix(", true"), f"{error:.2g}", f"{force / error:.0f}") for name, error in errors]
-    return markdown(("step of `wam-press`", "error, N", "steady force over this error"), shown)
+    return markdown(("step of `wam-press`", "error, N", "steady force / this error"), shown)
 
 
 def verdict(file: str) -> str:

@@ -163,14 +163,14 @@ def scorecard(measures: Measures) -> tuple[Requisite, ...]:
         _row("robustness", "impact force at the tip (3.1)", _impact(m), "N", source="3.2.2"),
         _row(
             "robustness",
-            "greatest cable tension at peak torque, over its strength",
+            "greatest cable tension at peak torque / cable strength",
             m.cable_tension,
             "",
             "at most",
             1.0,
             "3.2.1",
         ),
-        _row("robustness", "pretension over half of the full-torque tension", m.pretension, "", "at least", 1.0, "6.5"),
+        _row("robustness", "pretension / half of the full-torque tension", m.pretension, "", "at least", 1.0, "6.5"),
         *_bandwidth(m),
         *_slenderness(m),
         _row(
@@ -209,7 +209,7 @@ def _impact(m: Measures) -> float:
 def _dynamic_range(m: Measures) -> list[Requisite]:
     name = "dynamic range"
     joints = [
-        _row(name, f"peak torque over friction, joint {i}", 1.0 / share, "", "at least", 1.0 / required, "7.2.2")
+        _row(name, f"peak torque / friction, joint {i}", 1.0 / share, "", "at least", 1.0 / required, "7.2.2")
         for i, (share, required) in enumerate(zip(m.friction_share, m.friction_required, strict=True), 1)
     ]
     return [
@@ -224,14 +224,14 @@ def _dynamic_range(m: Measures) -> list[Requisite]:
         ),
         _row(
             name,
-            "steady force over force masked by friction, open loop",
+            "steady force / force masked by friction, open loop",
             m.steady_force / m.least_force,
             "",
             source="3.2.1",
         ),
         _row(
             name,
-            "steady force over the largest stiction cycle (5.8) of the joints alone, force feedback",
+            "steady force / largest stiction cycle (5.8) of the joints alone, force feedback",
             m.steady_force / m.cycle_force if m.cycle_force else math.inf,
             "",
             source="3.2.1",
@@ -250,14 +250,14 @@ def _bandwidth(m: Measures) -> list[Requisite]:
     return [
         _row("high bandwidth", f"{text} (4.4)", float(lower[worst]) / (2.0 * math.pi), "Hz", source="3.2.3"),
         _row("high bandwidth", all_joints, m.coupled_bandwidth, "Hz", source="3.2.3"),
-        _row("high bandwidth", f"{text}, over its asymptote (4.6)", float(share[worst]), "", source="4.4"),
+        _row("high bandwidth", f"{text} / its asymptote (4.6)", float(share[worst]), "", source="4.4"),
     ]
 
 
 def _slenderness(m: Measures) -> list[Requisite]:
     name = "high aspect ratio"
     rows = [
-        _row(name, f"length over width, link {i}", ratio, "", "at least", required, "7.2.1")
+        _row(name, f"length / width, link {i}", ratio, "", "at least", required, "7.2.1")
         for i, (ratio, required) in enumerate(zip(m.aspect_ratio, m.aspect_required, strict=True), 1)
     ]
     worst = min(m.aspect_ratio)
@@ -265,8 +265,8 @@ def _slenderness(m: Measures) -> list[Requisite]:
     cylinder = float(largest_cylinder(worst, m.cover_friction))
     return [
         *rows,
-        _row(name, "useful length over length, least slender link (3.2)", grasp, "", source="3.2.4"),
-        _row(name, "largest cylinder it holds, over its length (3.3)", cylinder, "", source="3.2.4"),
+        _row(name, "useful length / length of the least slender link (3.2)", grasp, "", source="3.2.4"),
+        _row(name, "diameter of the largest held cylinder / length of a link (3.3)", cylinder, "", source="3.2.4"),
     ]
 
 
@@ -274,7 +274,7 @@ def _backdrivability(m: Measures) -> list[Requisite]:
     """Rotors below the link, N below N_m (4.1.2); friction is in the dynamic range."""
     name = "good backdrivability"
     reflected = [
-        _row(name, f"rotors' inertia over the link's, joint {i}", rotor / link, "", "at most", 1.0, "3.2.6, 4.1.2")
+        _row(name, f"rotors' inertia / link's inertia, joint {i}", rotor / link, "", "at most", 1.0, "3.2.6, 4.1.2")
         for i, (rotor, link) in enumerate(zip(m.rotor_inertia, m.link_inertia, strict=True), 1)
     ]
     mass = _row(name, "effective mass at the tip", m.effective_mass, "kg", source="3.2.6")

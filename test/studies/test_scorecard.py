@@ -108,7 +108,7 @@ def test_push_that_moves_no_joint_is_the_least_over_joints_and_the_greatest_over
             force += 0.02
         held.append(force)
     assert arm.least_force == pytest.approx(max(held), abs=0.03)
-    dynamic_range = row(scorecard(arm), "steady force over force masked")
+    dynamic_range = row(scorecard(arm), "steady force / force masked")
     assert dynamic_range.value == pytest.approx(arm.steady_force / max(held), rel=0.01)
 
 
@@ -161,12 +161,12 @@ def test_coupled_bandwidth_is_the_least_of_the_arm_whose_rotors_are_free(
     ("change", "measure"),
     [
         ({"steady_force": 40.0}, "steady force at any point"),
-        ({"friction_share": (0.014, 0.02, 0.01, 0.01)}, "peak torque over friction, joint 2"),
+        ({"friction_share": (0.014, 0.02, 0.01, 0.01)}, "peak torque / friction, joint 2"),
         ({"cable_tension": 1.1}, "greatest cable tension"),
         ({"pretension": 0.9}, "pretension"),
-        ({"aspect_ratio": (5.0, 8.0)}, "length over width, link 2"),
+        ({"aspect_ratio": (5.0, 8.0)}, "length / width, link 2"),
         ({"efficiency": 0.9}, "limiting efficiency"),
-        ({"rotor_inertia": (0.01, 0.01, 9.0, 0.01)}, "rotors' inertia over the link's, joint 3"),
+        ({"rotor_inertia": (0.01, 0.01, 9.0, 0.01)}, "rotors' inertia / link's inertia, joint 3"),
     ],
 )
 def test_a_worse_number_fails_its_own_row_alone(arm: Measures, change: dict[str, object], measure: str) -> None:
@@ -180,4 +180,4 @@ def test_bandwidth_is_the_lowest_eigenvalue_of_any_joint(configuration: Configur
     lowest = rule["bandwidth, Hz"].min()
     assert row(scorecard(arm), "force bandwidth, joint 2 (4.4)").value == pytest.approx(lowest, rel=1e-6)
     rotor_alone = math.sqrt(arm.transmission_stiffness[1] / arm.rotor_inertia[1]) / (2.0 * math.pi)
-    assert row(scorecard(arm), "over its asymptote").value == pytest.approx(lowest / rotor_alone, rel=1e-6)
+    assert row(scorecard(arm), "/ its asymptote").value == pytest.approx(lowest / rotor_alone, rel=1e-6)
