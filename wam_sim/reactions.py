@@ -195,8 +195,8 @@ def settling_time_in(settling_times: Sequence[tuple[int, float]], step: StepSpan
 def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[StepSpan]) -> str:
     """What `unassessed` means of the steps that it gives, in words."""
     values = dict.fromkeys(settling_time_in(settling_times, one) for one in steps)
-    limit = f"{SETTLING_TIME}, {' or '.join(f'{seconds:g}' for seconds in values)} s"
-    return f"not assessed: force, torque or motion of a task commanded for no longer than {limit}"
+    limit = f"{' or '.join(f'{seconds:g}' for seconds in values)} s ({SETTLING_TIME})"
+    return f"not assessed: its force, torque or motion was commanded for at most {limit}"
 
 
 def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:

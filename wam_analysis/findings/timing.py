@@ -74,7 +74,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
             wrong.append(f"{name}: the period changes, from {shown(found.period, 's')} to {longer}.")
         if found.missed:
             gap = shown(found.longest_gap, "s")
-            wrong.append(f"{name}: {found.missed} missing, the longest gap {gap}.")
+            wrong.append(f"{name}: {found.missed} messages missing; longest gap: {gap}.")
     if recording.is_foreign:
         stated = "No message is missing." if findings else "No stamped topic was recorded."
         return Section("timing", "Timing", wrong or [stated], findings, wrong=wrong)

@@ -253,7 +253,7 @@ def _numbers(column: Any) -> Numbers:
     found = [_number(one.replace(of_thousands, "")) for one in texts]
     for text, number in zip(texts, found, strict=True):
         if math.isnan(number) and text.lower() not in NO_NUMBER:
-            raise BagError(f"a cell has '{text}', which is no number; leave it empty, or give each number a column")
+            raise BagError(f"a cell has '{text}', which is no number; leave it empty, or give each number its column")
     return np.array(found)
 
 

@@ -59,8 +59,8 @@ def run(given: argparse.Namespace) -> int:
         pushing = next((step.name for step in steps if step.push), "")
         if pushing and not configuration.shared.is_simulated:
             raise ValueError(
-                f"{given.scenario}: step '{pushing}' has a push, which the driver of this arm does not take; leave out "
-                "the key push; a real arm is pushed by hand, that of a simulated bus cannot be pushed"
+                f"{given.scenario}: step '{pushing}' has a push, but the driver of this arm cannot push; leave out the "
+                "key push (a real arm can be pushed by hand)"
             )
     stop = Stop()
     processes = processes_of(configuration, given)
