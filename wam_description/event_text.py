@@ -109,7 +109,7 @@ SENTENCES: Final = {  # by cause
     "the arm holds its position, and presses once it is at rest",
     "task": "{reason}; the arm holds its position",
     "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "
-    "arm; until then the arm moves back to where it touched nothing",
+    "arm; until then the arm moves away from the contact, and holds",
     "free_travel": "the arm has moved {travel} the force {since}; allowed: {allowed:g} m "
     "(limits.free_travel); the arm holds its position; end the command, bring the arm to the surface, then begin again",
     # the arm goes on

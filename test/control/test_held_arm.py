@@ -133,6 +133,16 @@ def test_an_arm_that_holds_presses_no_harder_than_commanded(hand: float, goes: b
     assert arm.at == pytest.approx(begin, abs=0.003), "it goes back"
 
 
+def test_an_arm_that_touches_with_another_link_moves_away_from_what_it_touches() -> None:
+    """Also if that is not along the force, and was touched before the command, so no place is known to be free."""
+    limits, side = replace(OWN.limits, doubt=2.0), np.array([0.0, 1.0, 0.0])
+    arm = Pushed(replace(OWN, contact_cover="inner_link", contact_position=0.4, limits=limits), 8.0)
+    begin = arm.at
+    arm.go(2.0, 2.0 * side, Contact("outer_link", 0.28, (0.0, 0.0, 2.0), 0.001, 1.0))
+    assert arm.loop.event.code is Code.UNEXPLAINED
+    assert side @ (arm.at - begin) == pytest.approx(0.003, rel=0.05)
+
+
 def test_without_a_lever_an_arm_holds() -> None:
     """A force away from the shoulder of a straight arm: no joint turns along it."""
     arm, before = Pushed(), [0.0, -1.0, 0.0, math.pi / 2.0]

@@ -366,7 +366,7 @@ class ForceLoop:
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
         rows: list[VelocityRow] = []
         if holds:
-            run.held_at = self._hold_at(found) if run.held_at is None else run.held_at
+            run.held_at = self._hold_at(found, contact) if run.held_at is None else run.held_at
             wanted = np.clip(own.posture_gain * (run.held_at - q), -own.joint_speed_limit, own.joint_speed_limit)
             # what it may hit on its way back after a push
             wanted = calm(wanted, self._axes.forces.moved_inertia(self._q), own.impact_energy(allowed))
@@ -388,14 +388,15 @@ class ForceLoop:
         effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces and not holds else fed.tolist()
         return velocity, effort, limits
 
-    def _hold_at(self, found: Sequence[Event]) -> Array:
-        """Where the arm is to hold (n,), rad: here, or off another link, where it last was free."""
+    def _hold_at(self, found: Sequence[Event], contact: Contact) -> Array:
+        """Where the arm is to hold (n,), rad: here, or off another link, on from where it last was free."""
         run, q = self._run, np.array(self._q)
+        torques = self._measurement.torques.now - run.resting
         is_elsewhere = any(event.holds and event.code is Code.UNEXPLAINED for event in found)
-        if not is_elsewhere or run.free_at is None or not run.axes or not run.axes[0].now.along.any():
+        if not is_elsewhere or run.free_at is None or not torques.any():
             return q
-        along = run.axes[0].now.along
-        return run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
+        away = torques * (math.hypot(*contact.force) / float(torques @ torques))
+        return run.free_at + FORCE.way_back * away  # friction would hold it in less
 
     def _rows(self, factor: float, is_watching: bool, dt: float) -> list[VelocityRow]:
         """The commanded velocity along each axis; none while the arm is watched before it moves."""
