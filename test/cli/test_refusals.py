@@ -37,7 +37,7 @@ REFUSED = [
     ("demo --no-live --name here", "bag bags/here exists already; give another name with --name, or move that"),
     ("bag record --name here", "bag bags/here exists already; give another name with --name, or move that bag away"),
     ("up --scenario nosuch", "no scenario 'nosuch'"),
-    ("up --config barrett-wam4-bus --scenario barrett-wam4_scenario", "has a push, which the driver of this arm"),
+    ("up --config barrett-wam4-bus --scenario barrett-wam4_scenario", "has a push, but the driver of this arm"),
     ("demo --no-live --name ../x", "'name' is '../x'; allowed: a name without directories"),
     ("demo --set force_loop:force_gain=[-1.0]", "parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
     ("demo --set driver:effects.added_coulomb_friction=[0.5]", "friction' has 1 values; it needs 4"),
