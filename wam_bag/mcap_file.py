@@ -6,6 +6,7 @@ whole file if there is no summary, are walked through record by record.
 
 import contextlib
 import mmap
+import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
@@ -29,8 +30,8 @@ from wam_bag.mcap_records import (
     MAGIC,
     ChunkPlace,
     RecordExtent,
+    checked,
     chunk_index,
-    chunk_of,
     decompress,
     message,
     parsed,
@@ -44,11 +45,6 @@ _OF_DATA: Final = {
     Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT,
     Opcode.METADATA,
 }  # fmt: skip
-
-
-def loose(start: int, end: int) -> ChunkPlace:
-    """Message records outside chunks: bytes of the file, about a batch at most."""
-    return ChunkPlace(start, end, end, 0, NEVER, end - start, frozenset(), is_loose=True)
 
 
 class MessageCounts(NamedTuple):
@@ -330,7 +326,9 @@ class McapFile(BagFile):
                 begin, last = record.start, self._blocks[-1] if self._blocks else None
                 if last and last.is_loose and last.end == begin and record.end - last.start <= BATCH:
                     begin = self._blocks.pop().start
-                self._blocks.append(loose(begin, record.end))
+                size = record.end - begin
+                place = ChunkPlace(begin, record.end, record.end, 0, NEVER, size, frozenset(), is_loose=True)
+                self._blocks.append(place)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self.define(opcode, self.content(record))
             elif opcode == Opcode.CHUNK:
@@ -341,7 +339,9 @@ class McapFile(BagFile):
                 raise Damage(f"a record at byte {record.start} has opcode {opcode}, which does not belong there")
 
     def _chunk_at(self, record: RecordExtent) -> ChunkPlace:
-        return chunk_of(record, self.content(record._replace(end=min(record.end, record.start + HEAD.size + 24))))
+        """A chunk without message indexes, from the first bytes of its record."""
+        first, last, size = struct.unpack_from("<QQQ", self._data, record.start + HEAD.size)
+        return checked(ChunkPlace(record.start, record.end, record.end, first, last, size, frozenset()))
 
     def _load(self, blocks: list[ChunkPlace], size: int) -> MessageBatch:
         buffer, parts = np.zeros(size + TAIL, np.uint8), [np.empty((4, 0), np.int64)]

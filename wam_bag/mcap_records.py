@@ -67,11 +67,10 @@ def message(content: bytes) -> records.Message:
     return records.Message.read(_Content(BytesIO(content)), len(content))
 
 
-def serialized(*items: records.McapRecord) -> bytes:
-    """Records as they are written to a file."""
+def serialized(record: records.McapRecord) -> bytes:
+    """A record as it is written to a file."""
     builder = RecordBuilder()
-    for item in items:
-        item.write(builder)
+    record.write(builder)
     return builder.end()  # type: ignore[no-untyped-call]
 
 
@@ -119,18 +118,12 @@ class ChunkPlace(NamedTuple):
     is_loose: bool = False
 
 
-def chunk_of(record: RecordExtent, head: bytes) -> ChunkPlace:
-    """A chunk without message indexes, from the place of its record and the first bytes of its content."""
-    first, last, size = struct.unpack_from("<QQQ", head)
-    return _checked(ChunkPlace(record.start, record.end, record.end, first, last, size, frozenset()))
-
-
 def chunk_index(content: bytes) -> ChunkPlace:
     """A chunk by its index record."""
     one: records.ChunkIndex = parsed(Opcode.CHUNK_INDEX, content)
     start, end = one.chunk_start_offset, one.chunk_start_offset + one.chunk_length
     channels = frozenset(one.message_index_offsets)
-    return _checked(
+    return checked(
         ChunkPlace(
             start, end, end + one.message_index_length, one.message_start_time, one.message_end_time,
             one.uncompressed_size, channels,
@@ -138,7 +131,8 @@ def chunk_index(content: bytes) -> ChunkPlace:
     )  # fmt: skip
 
 
-def _checked(place: ChunkPlace) -> ChunkPlace:
+def checked(place: ChunkPlace) -> ChunkPlace:
+    """The same; raises TooLargeError if it would take too much memory."""
     if place.size > LARGEST_CHUNK:
         raise TooLargeError(
             f"the chunk at byte {place.start} is to hold {place.size} bytes; chunks of at most {LARGEST_CHUNK} are read"
