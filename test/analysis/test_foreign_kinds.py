@@ -381,12 +381,23 @@ def held_over() -> list[Case]:
 
 
 def wrong_efforts() -> list[Case]:
+    chance = np.random.default_rng(1)
+
     def changed(change: Any) -> list[Sent]:
         sent = one("/joint_states", 100.0, 0.7, 0.5)
         return [s._replace(fields=s.fields | {"effort": change(s.fields["effort"])}) for s in sent]
 
     return [
         Case("sign", sqlite, changed(lambda e: -e), sine(0.7, 0.5), "as if the effort had the other sign"),
+        Case(
+            "noise",
+            by_rosbags,
+            changed(lambda e: chance.normal(size=1)),
+            sine(0.7, 0.5),
+            "",
+            NOTHING,
+            ("a: no friction is determined: dry friction ", "; the motion has too little that is slow and fast"),
+        ),
         Case("limited", by_rosbags, changed(lambda e: np.clip(e, -1.6, 1.6)), sine(0.7, 0.5), "as if it was limited"),
     ]
 

@@ -1,14 +1,14 @@
 """Section about friction and inertia of the joints of another robot, from their effort."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import rest_speed
 from wam_analysis.foreign.sources import Piece, Source, pieces, rests, velocity_fit, ways
-from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
+from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers
@@ -28,25 +28,24 @@ def effort_section(recording: AnalysedRecording) -> Section:
         unlike = contradiction(one) or _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
         found, lag = friction(one) if one.is_joint and not unlike else (Friction(), 0.0)
-        if not _is_known(found):
-            if found.dynamic.is_negative:
-                wrong.append(f"{one.label}: {BELOW_ZERO.format(shown(found.dynamic.value, one.units['effort']))}")
-            elif not unlike and {"effort"} < one.values.keys() and not rests(one):
-                doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
-            continue
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s").partition("/")[0]
         every = (
             ("dry friction", effort, found.dynamic),
             ("viscous friction", f"{effort} s/{speed}", found.viscous),
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
+        if not _is_known(found):
+            if found.dynamic.is_negative:
+                wrong.append(f"{one.label}: {BELOW_ZERO.format(shown(found.dynamic.value, effort))}")
+            elif not unlike and {"effort"} < one.values.keys() and not rests(one):
+                doubts.append(f"{one.label}: no friction is determined: {_lacking(every)}.")
+            continue
         numbers = [number for number in every if number[2].is_sure]
         findings += [
             Finding(f"{one.label}: {what}", unit, known.value, error=known.error) for what, unit, known in numbers
         ]
         unexplained = f"unexplained: {100.0 * found.unexplained:.2f} % of the effort (rms)"
-        values = [f"{what} {shown(known.value)} +- {shown(known.error, unit)}" for what, unit, known in numbers]
-        brief.append(f"{one.label}: {', '.join(values)}; {unexplained}.")
+        brief.append(f"{one.label}: {_stated(numbers)}; {unexplained}.")
         missing = [what for what, _, known in every if not (math.isnan(known.value) or known.is_sure)]
         remarks = [unexplained]
         if math.isnan(found.inertia.value):
@@ -69,6 +68,21 @@ def effort_section(recording: AnalysedRecording) -> Section:
             "friction from a delay of the effort."
         )
     return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, (), brief, wrong)
+
+
+def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:
+    """Numbers with their names, units and standard errors."""
+    return ", ".join(f"{what} {shown(known.value)} +- {shown(known.error, unit)}" for what, unit, known in numbers)
+
+
+def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]]) -> str:
+    """Which condition of an identified friction is not met."""
+    if below := [number for number in numbers if number[2].is_negative]:
+        return f"{_stated(below)} is below zero, so the effort holds more than friction, inertia and weight"
+    if math.isnan(numbers[0][2].value):
+        part = f"less than {100.0 * SHAFT.both_ways:g} % of the way is to one side"
+        return f"fewer than {SHAFT.fewest_samples} samples are apart from turns, or {part}"
+    return f"{_stated(numbers[:2])}; the motion has too little that is slow and fast for smaller errors"
 
 
 def _limited(source: Source) -> str:
