@@ -239,11 +239,11 @@ class RunningArm:
                 if condition():
                     return
                 look()
-                if stamp > limit:
-                    raise AssertionError(f"not met within {seconds:g} s of the arm's time: {_source(condition)}")
-                if now > end:
-                    at = f"the arm is at {stamp / SECOND:.3f} s"
-                    raise AssertionError(f"not met within {TEST_LIMITS.patience:g} s: {_source(condition)}; {at}")
+                if stamp > limit or now > end:
+                    waited = f"{seconds:g} s of the arm's time" if stamp > limit else f"{TEST_LIMITS.patience:g} s"
+                    q = self.newest("joint_states")
+                    at = f"at {stamp / SECOND:.3f} s joint_states is {q and [round(x, 4) for x in q.position]}"
+                    raise AssertionError(f"not met within {waited}: {_source(condition)}; {at}")
             self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
 
     def run(self, seconds: float) -> None:

@@ -1,5 +1,8 @@
 """Frames for /tf against the table of (A.4) by hand and pinocchio's own reading of the URDF, alone and over topics."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -61,6 +64,18 @@ def test_covers_and_links_of_the_thesis_are_where_its_table_puts_them() -> None:
             np.testing.assert_allclose(found[f"left/link{i + 1}"], frame(q, i + 1), atol=1e-9)
         for cover in ("inner_link", "outer_link"):
             np.testing.assert_allclose(found[f"left/{cover}"], cover_frame(q, cover), atol=1e-9)
+
+
+PAGE = Path(__file__).parents[2] / "docs/topics.md"
+AXES = re.findall(r"^\| `(\w+)` of `(.*)` \| (.*) \| (.*) \| (.*) \|$", PAGE.read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize(("cover", "name", "axes"), [(cover, name, axes) for cover, name, *axes in AXES])
+def test_the_axes_of_a_cover_point_where_the_page_states(cover: str, name: str, axes: list[str]) -> None:
+    frames = ArmFrames(arm_of(name))
+    turn = in_the_root([*frames.fixed, *frames.moving([0.0] * 4)])[cover][:3, :3]
+    stated = [(-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])] for axis in axes]
+    np.testing.assert_allclose(turn.T, stated, atol=1e-9)
 
 
 @pytest.mark.parametrize(
