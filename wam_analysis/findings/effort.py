@@ -179,9 +179,9 @@ def friction(source: Source) -> tuple[Friction, float]:
     velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)
     has_weight = "position" in joined and source.units["position"] == "rad"
     angle = joined.get("position", velocity)
-    load = np.column_stack([np.sin(angle), np.cos(angle), angle] if has_weight else [0.0 * velocity])  # and a spring
+    weight = [np.sin(angle), np.cos(angle), angle] if has_weight else []  # and a spring
+    loads = np.column_stack([velocity * np.abs(velocity), *weight])  # with a drag
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
-    loads = np.column_stack([velocity * np.abs(velocity), load])  # with a drag
     time = period * np.arange(len(velocity), dtype=np.float64)
 
     def fit(shift: int) -> Friction:
@@ -189,7 +189,7 @@ def friction(source: Source) -> tuple[Friction, float]:
         return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, load=loads)
 
     width = round(window / period)
-    own, noise = _own_acceleration(velocity, sd, load, rest, width, period)
+    own, noise = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = has_weight and own < SHAFT.apart
     found, shift = (fit(0), 0) if one_frequency else _best(fit, math.ceil(SHAFT.longest_effort_lag / period))
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))

@@ -50,8 +50,8 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     rows = row_at(command.time, measured.time[known])
     got = np.column_stack([measured.values[axis][known] for axis in axes])
     wanted = desired[rows]
-    together = (got - got.mean(axis=0)) * (wanted - wanted.mean(axis=0)), got * wanted  # or both are constant
-    sign = next(filter(None, (np.sign(float(np.sum(one))) for one in together)), 1.0)
+    middle = wanted.mean(axis=0) if np.any(wanted != wanted[0]) else 0.0
+    sign = np.sign(float(np.sum(got * (wanted - middle)))) or 1.0
     found, arrives = [], command.arrives
     for last, row, until in zip([0.0 * desired[0], *desired[begins[:-1]]], begins, ends, strict=True):
         begin = max(float(command.time[row]), float(measured.time[0]))

@@ -203,26 +203,22 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     number, of = int(np.sum(same)), len(rows)
     numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
     changed = np.any(numbers[1:] != numbers[:-1], axis=1)
-    if not number and np.std(steps) > STREAM.pace * np.median(steps) and np.mean(changed) <= STREAM.relayed:
-        repeats = [_held_over(column) for column in numbers.T if np.ptp(column)]
-        kept = ~np.all(repeats, axis=0) if repeats else np.ones(of, np.bool_)
-        if not np.all(kept):
-            relayed = Treated(Treatment.RELAYED, "", of - int(np.sum(kept)), of)
-            return _Timed(rows[kept], stamps[kept] / 1e9, (relayed,))
+    kept, what = np.concatenate([[True], ~same]), Treatment.TWICE
+    is_uneven = not number and np.std(steps) > STREAM.pace * np.median(steps)
+    if is_uneven and 0.0 < np.mean(changed) <= STREAM.relayed:
+        kept = ~np.all([_held_over(column) for column in numbers.T if np.ptp(column)], axis=0)
+        what = Treatment.RELAYED
     twice = same & ~changed
-    are_copies = bool(number) and np.array_equal(same, twice) and 2 * np.sum(changed) >= np.sum(~same)
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
+    again *= 2 * np.sum(changed) < np.sum(~same)  # they are no copies where nothing moves
     is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
-    is_even = np.std(waits) < STREAM.paced * np.std(steps[~same] if is_seldom else steps)
-    if of > SHAFT.fewest_samples and is_even and not are_copies:
+    if of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps[~same] if is_seldom else steps):
         quantum = int(np.gcd.reduce(steps))
         if quantum > STREAM.irregular * np.median(steps[~same]):
             return _received(rows, stamps, received, quantum)
-    if not number:
-        return _Timed(rows, stamps / 1e9, ())
     if is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]:
-        kept = np.concatenate([[True], ~same])
-        return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(Treatment.TWICE, "", number, of),))
+        left_out = of - int(np.sum(kept))
+        return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
     placed = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])

@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Numbers, Times
@@ -72,7 +73,7 @@ def _periods(steps: Numbers) -> Numbers:
     own = np.median(parts, axis=1, keepdims=True)
     is_even = np.mean(np.abs(parts - own) <= STREAM.pace * own, axis=1) >= STREAM.evenly
     near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
-    slowest = np.maximum(np.maximum(near[:-2], near[2:]), near[1:-1])
+    slowest = np.max(sliding_window_view(near, 3), axis=1)
     return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
 
 
