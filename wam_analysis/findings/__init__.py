@@ -10,7 +10,6 @@ repetition             sections about cycles and lines in a spectrum, of another
 effort                 section about friction and inertia of another robot
 stick_slip             section about rest and motion of motors and joints
 force                  sections about force and stability
-swinging               whether a force settles, cycles or diverges
 contact                section about contacts, estimated and true
 prediction             the friction node at the contact, what chapter 5 and the stability guard predict for it
 transmission           motors, cables and joints on one time base, and their friction

@@ -1,4 +1,4 @@
-"""Each commanded force: how it was reached and held, and what theory predicts for it."""
+"""Each commanded force: how it was reached and held, whether it settles, and what theory predicts for it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,16 +17,17 @@ from wam_analysis.findings.prediction import (
     node_at,
     predict,
 )  # fmt: skip
-from wam_analysis.findings.swinging import Swinging, swinging
 from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.holds import Hold, measured_force
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
+from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_analysis.traces import Traces
 from wam_bag.arrays import Mask, Numbers
+from wam_bag.bag import JointColumns
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
@@ -53,6 +54,13 @@ class ForceAccuracy(NamedTuple):
 
 
 UNMEASURED = dict.fromkeys(("true", "measured", "estimated"), ForceAccuracy())
+
+
+class Swinging(NamedTuple):
+    """What swings during a hold: a motor or joint, '' for the force."""
+
+    shaft: str
+    swings: Swings
 
 
 class HeldForce(NamedTuple):
@@ -131,7 +139,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
         before=_before(traces, hold, measured),
         accuracy=UNMEASURED if hold.is_short else accuracy,  # a short one has no steady part
         cycle=next(filter(None, cycles), NO_CYCLE),
-        swinging=swinging(run, hold, *((time, measured) if len(measured) else (time_true, true))),
+        swinging=_swinging(run, hold, *((time, measured) if len(measured) else (time_true, true))),
     )
 
 
@@ -220,6 +228,46 @@ def _touched(traces: Traces, parameters: PredictionParameters, during: Mask) -> 
                 return cover, float(np.median(positions[known]))
     loop = parameters.force_loop
     return (loop.contact_cover, loop.contact_position) if loop is not None else ("", math.nan)
+
+
+def _swinging(run: RecordedRun, hold: Hold, time: Numbers, force: Numbers) -> Swinging | None:
+    """The swings of a force, (n,), N; without one those of the motor, or else the joint, that show most about a hold.
+
+    None if nothing was recorded.
+    """
+    good = np.isfinite(force)
+    time, force = time[good], force[good]
+    if len(force):
+        band = max(HOLD.loud * hold.commanded, 4.0 * noise(force))
+        return Swinging("", swings(time, hold.commanded - force, 2.0 * band, band))
+    found = []
+    for topic in ("motor_states", "joint_sensors", "joint_states"):
+        columns = run.joints(topic)
+        if columns is None or not columns.position.shape[1]:
+            continue
+        for i, name in enumerate(columns.names):
+            one = _swings(columns, i, hold)
+            if one is not None:
+                found.append(Swinging(name, one))
+        if found:
+            break
+    order = (Verdict.DIVERGED, Verdict.LIMIT_CYCLE, Verdict.SETTLED, Verdict.UNDECIDED)
+    return min(found, key=lambda one: (order.index(one.swings.verdict), -one.swings.number), default=None)
+
+
+def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
+    a, b = (int(row) for row in np.searchsorted(columns.stamp_ns, [hold.begin, hold.end]))
+    value = columns.position[a:b, i]
+    if len(value) < SHAFT.fewest_samples or not np.all(np.isfinite(value)):
+        return None
+    extent = float(np.ptp(value[int((1.0 - CYCLE.late_part) * len(value)) :]))
+    if extent < CYCLE.still_shaft:
+        return None
+    return swings(
+        (columns.stamp_ns[a:b] - hold.begin) / 1e9,
+        value,
+        max(CYCLE.least_swing * extent, CYCLE.loud_swing * noise(value)),
+    )
 
 
 class Theory(NamedTuple):
