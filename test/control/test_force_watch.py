@@ -111,6 +111,10 @@ def test_a_force_that_is_not_reached_is_reported_after_the_settling_time_and_aft
     assert pressed.last(0.1, FORCE - 0.8) == strays
     assert pressed.last(SETTLING - 0.05, FORCE) == strays, "what takes it away comes again"
     assert pressed.last(0.1, FORCE) == []
+    crossed = Pressed()
+    assert crossed.last(0.1, FORCE) == []
+    assert crossed.last(SETTLING - 0.2, 2.0 * FORCE) == [], "a force that rises too far was not reached yet"
+    assert crossed.last(SETTLING, FORCE) == []
 
 
 def test_torques_that_the_force_does_not_explain_are_reported_while_it_presses() -> None:

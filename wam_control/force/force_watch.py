@@ -199,8 +199,9 @@ class ForceWatch:
             values["has_touched"] = float(self.touch.is_there)
             cause = "force_strays" if self._has_settled else "force_off"
             events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
-        self._has_settled = self._has_settled or (is_reached and not self._off.is_on)
-        events += self._unexplained(axis, known, is_reached, torques, lasting, dt)
+        # a force that rises too far is only crossed
+        self._has_settled = self._right.step(is_reached, soon, dt, dt) or self._has_settled
+        events += self._unexplained(axis, known, torques, lasting, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
             sd = own.sensing.torque_sd
             sd = axis.sensed.error(sd) if axis.sensed else sd
@@ -257,7 +258,7 @@ class ForceWatch:
         )
 
     def _unexplained(
-        self, axis: CommandedAxis, known: Belief, is_reached: bool, torques: Array, lasting: float, dt: float
+        self, axis: CommandedAxis, known: Belief, torques: Array, lasting: float, dt: float
     ) -> list[Event]:
         """The torques are not those of the force, or no longer those with which it has settled."""
         if axis.sensed is None or axis.place is None or known.sd == math.inf:
@@ -266,7 +267,7 @@ class ForceWatch:
         is_strange = known.chi2 > FORCE.unexplained and self.touch.is_there
         if self._strange.step(is_strange, lasting, lasting, dt):
             return [warning(Code.UNEXPLAINED, "torques_differ", **where, chi2=known.chi2, allowed=FORCE.unexplained)]
-        if self._right.step(is_reached, FORCE.quarter * lasting, dt, dt) and self._pattern is None:
+        if self._right.is_on and self._pattern is None:
             # with the pose the torques of the force change, too; what is estimated moves with whatever else pushes
             self._pattern = torques / known.force + axis.sensed.press * axis.place.is_pinned
         if not self.touch.is_there or self._pattern is None:
