@@ -49,7 +49,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         findings += [
             Finding("correct link, of all contact time", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
-            Finding("force error (vector), median", "N", off, note=vector),
+            Finding("norm of the force error, median", "N", off, note=vector),
         ]
         shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
     if np.any(known):
