@@ -24,10 +24,10 @@ def effort_section(recording: AnalysedRecording) -> Section:
     """Friction and inertia of the joints of another robot."""
     states = recording.states
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
-    for one in states:
+    for one in (one for one in states if one.is_joint):
         unlike = contradiction(one) or _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
-        found, lag = friction(one) if one.is_joint and not unlike else (Friction(), 0.0)
+        found, lag = (Friction(), 0.0) if unlike else friction(one)
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s").partition("/")[0]
         every = (
             ("dry friction", effort, found.dynamic),
@@ -177,9 +177,8 @@ def friction(source: Source) -> tuple[Friction, float]:
         if q in some[0].values
     }
     velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)
-    has_weight = "position" in joined and source.units["position"] == "rad"
-    angle = joined.get("position", velocity)
-    weight = [np.sin(angle), np.cos(angle), angle] if has_weight else []  # and a spring
+    way = [joined[q] for q in ("position",) if q in joined]
+    weight = [*way, *(of(q) for q in way for of in (np.sin, np.cos) if source.units["position"] == "rad")]  # or spring
     loads = np.column_stack([velocity * np.abs(velocity), *weight])  # with a drag
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     time = period * np.arange(len(velocity), dtype=np.float64)
@@ -190,7 +189,7 @@ def friction(source: Source) -> tuple[Friction, float]:
 
     width = round(window / period)
     own, noise = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
-    one_frequency = has_weight and own < SHAFT.apart
+    one_frequency = bool(weight) and own < SHAFT.apart
     found, shift = (fit(0), 0) if one_frequency else _best(fit, math.ceil(SHAFT.longest_effort_lag / period))
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
