@@ -1,4 +1,4 @@
-"""A task as data: what is commanded along each of its axes, in the order of priority; as a table and back.
+"""A task as data: what is commanded along each of its axes; as a table and back.
 
 An axis is a direction at a point of a link, or a joint.  Along it the task commands a force, a velocity, a
 position, or an impedance, which is free to be led by hand where its stiffness is zero [Raibert 81, Hogan 85].
@@ -73,7 +73,7 @@ class TaskAxis(NamedTuple):
 
 
 class TaskCommand(NamedTuple):
-    """Axes in the order of their priority; their directions are in `frame`, 'base' or a cover."""
+    """Axes that count alike; their directions are in `frame`, 'base' or a cover."""
 
     frame: str
     axes: tuple[TaskAxis, ...]

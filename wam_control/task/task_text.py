@@ -4,7 +4,7 @@ One task as an example::
 
     task:
       frame: base                      # or a cover, or {of: base, rpy: [0, 0, 0.3]}: axes of a frame of your own
-      axes:                            # in the order of their priority
+      axes:                            # axes that contradict each other share what is left
         - {force: 10.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}   # or estimated
         - {velocity: 0.04, along: [0, 1, 0], cover: outer_link, contact_position: 0.28}
         - {position: here, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}
