@@ -337,7 +337,7 @@ def test_a_model_that_contradicts_the_configured_arm_is_written_by_force_only(
             main(["identify", str(bag), "--write", str(model), *more])
         assert ended.value.code == code
         assert model.exists() is (code == 0)
-    assert re.search(r"all torques are 1\.\d times those of the configuration: amperes", capsys.readouterr().err)
+    assert re.search(r"all torques are 1\.\d times those of the configuration: is the effort", capsys.readouterr().err)
 
 
 @pytest.mark.slow
