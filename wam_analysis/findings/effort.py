@@ -17,7 +17,6 @@ RECORD = (
     "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
     "and fast, for some ten seconds, while nothing touches the arm."
 )
-BELOW_ZERO = "its dry friction comes out as {}, as if the effort had the other sign, or something else moved the joint."
 
 
 def effort_section(recording: AnalysedRecording) -> Section:
@@ -35,10 +34,9 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            if found.dynamic.is_negative:
-                wrong.append(f"{one.label}: {BELOW_ZERO.format(shown(found.dynamic.value, effort))}")
-            elif not unlike and {"effort"} < one.values.keys() and not rests(one):
-                doubts.append(f"{one.label}: no friction is determined: {_lacking(every)}.")
+            if not unlike and {"effort"} < one.values.keys() and not rests(one):
+                which = wrong if found.dynamic.is_negative else doubts
+                which.append(f"{one.label}: no friction is determined: {_lacking(every)}.")
             continue
         numbers = [number for number in every if number[2].is_sure]
         findings += [
@@ -78,7 +76,7 @@ def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:
 def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]]) -> str:
     """Which condition of an identified friction is not met."""
     if below := [number for number in numbers if number[2].is_negative]:
-        return f"{_stated(below)} is below zero, so the effort holds more than friction, inertia and weight"
+        return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
     if math.isnan(numbers[0][2].value):
         part = f"less than {100.0 * SHAFT.both_ways:g} % of the way is to one side"
         return f"fewer than {SHAFT.fewest_samples} samples are apart from turns, or {part}"
