@@ -22,7 +22,8 @@ RECORD = (
 def effort_section(recording: AnalysedRecording) -> Section:
     """Friction and inertia of the joints of another robot."""
     states = recording.states
-    sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
+    sentences, findings, brief, alone = [], [], [], []
+    doubts, wrong = list[str](), list[str]()
     for one in (one for one in states if one.is_joint):
         unlike = contradiction(one) or _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)

@@ -74,10 +74,11 @@ class Sticking(NamedTuple):
         """How much of the time it was at rest, and how often it moved."""
         if not self.slips:
             return "never moved"
+        turns = ", half the time between two turns" * self.is_turning
+        counted = f"a rest counts from {shown(self.shortest, 's')}{turns}"
         if not self.stuck and self.slips == 1:
-            turns = ", half the time between two turns" * self.is_turning
-            return f"always in motion (a rest counts from {shown(self.shortest, 's')}{turns})"
-        return f"at rest for {100.0 * self.stuck:.0f} % of the time, moved {times(self.slips)}"
+            return f"always in motion ({counted})"
+        return f"at rest for {100.0 * self.stuck:.0f} % of the time ({counted}), moved {times(self.slips)}"
 
 
 def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
