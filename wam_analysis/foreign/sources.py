@@ -13,7 +13,7 @@ from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.held_messages import row_at
-from wam_analysis.measures.runs import after_gaps, noise
+from wam_analysis.measures.runs import after_gaps, noise, usual_steps
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
@@ -450,8 +450,11 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
     source = source.only(*(quantities or source.values))
     if len(source.time) < SHAFT.fewest_samples:
         return []
-    period = float(np.median(np.diff(source.time)))
-    inner = np.flatnonzero(after_gaps(source.time)).tolist()
+    steps = np.diff(source.time)
+    period = float(np.median(steps))
+    slow = steps[usual_steps(steps) > STREAM.changes * period]
+    period = float(np.median(slow)) if 2.0 * np.sum(slow) > np.sum(steps) else period  # that of most of the time
+    inner = (np.flatnonzero(steps > STREAM.filled * period) + 1).tolist()
     found = []
     for begin, end in zip([0, *inner], [*inner, len(source.time)], strict=True):
         if end - begin < SHAFT.fewest_samples:

@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
+from wam_analysis.measures.runs import usual_steps
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Numbers, Times
 
@@ -43,7 +43,7 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
         as in lockstep bags, whose log times are the stamps.
     """
     steps, times = np.diff(stamp), np.unique(stamp)
-    periods = _periods(np.diff(times).astype(np.float64)) if len(times) > 1 else np.full(1, math.nan)
+    periods = usual_steps(np.diff(times).astype(np.float64)) if len(times) > 1 else np.full(1, math.nan)
     jitter = worst = math.nan
     if received is not None:
         intervals: Numbers = np.diff(np.sort(received).astype(np.float64)) / 1e9
@@ -57,24 +57,6 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
         jitter=jitter,
         worst=worst,
     )
-
-
-def _periods(steps: Numbers) -> Numbers:
-    """The usual step about each, (n,): that of all, or of the steps about it where these are even, as at another rate.
-
-    Where many are missing the median of all is longer than a period.
-    """
-    usual = float(np.median(steps))
-    usual = float(np.median(steps[np.rint(steps / usual) == 1.0]))
-    number = len(steps) // STREAM.steps
-    if not number:
-        return np.full(len(steps), usual)
-    parts = steps[: number * STREAM.steps].reshape(number, STREAM.steps)
-    own = np.median(parts, axis=1, keepdims=True)
-    is_even = np.mean(np.abs(parts - own) <= STREAM.pace * own, axis=1) >= STREAM.evenly
-    near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
-    slowest = np.max(sliding_window_view(near, 3), axis=1)
-    return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
 
 
 def _missed(times: Times, periods: Numbers) -> int:

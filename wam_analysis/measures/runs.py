@@ -1,6 +1,7 @@
 """Intervals in which a condition holds, and the noise of a signal."""
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Mask, Numbers, Rows
@@ -16,6 +17,24 @@ def after_gaps(time: Numbers | Rows) -> Mask:
     steps = np.diff(time)
     late = steps > STREAM.filled * np.median(steps) if len(steps) else np.zeros(0, np.bool_)
     return np.concatenate([np.zeros(min(1, len(time)), np.bool_), late])
+
+
+def usual_steps(steps: Numbers) -> Numbers:
+    """The usual step about each, (n,): that of all, or of the steps about it where these are even, as at another rate.
+
+    Where many are missing the median of all is longer than a period.
+    """
+    usual = float(np.median(steps))
+    usual = float(np.median(steps[np.rint(steps / usual) == 1.0]))
+    number = len(steps) // STREAM.steps
+    if not number:
+        return np.full(len(steps), usual)
+    parts = steps[: number * STREAM.steps].reshape(number, STREAM.steps)
+    own = np.median(parts, axis=1, keepdims=True)
+    is_even = np.mean(np.abs(parts - own) <= STREAM.pace * own, axis=1) >= STREAM.evenly
+    near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
+    slowest = np.max(sliding_window_view(near, 3), axis=1)
+    return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
 
 
 def runs(mask: Mask) -> Rows:
