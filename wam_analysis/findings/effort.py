@@ -35,7 +35,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            if not unlike and {"effort"} < one.values.keys() and not rests(one):
+            if not unlike and np.any(one.values.get("effort", 0.0)) and len(one.values) > 1 and not rests(one):
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: no friction is determined: {_lacking(every)}.")
             continue
@@ -81,7 +81,8 @@ def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]]) -> str:
     if math.isnan(numbers[0][2].value):
         part = f"less than {100.0 * SHAFT.both_ways:g} % of the way is to one side"
         return f"fewer than {SHAFT.fewest_samples} samples are apart from turns, or {part}"
-    return f"{_stated(numbers[:2])}; the motion has too little that is slow and fast for smaller errors"
+    finite = _stated([number for number in numbers[:2] if math.isfinite(number[2].error)])
+    return f"{finite}{'; ' * bool(finite)}the motion has too little that is slow and fast for smaller errors"
 
 
 def _limited(source: Source) -> str:
