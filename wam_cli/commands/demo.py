@@ -164,7 +164,7 @@ def _report_of_task(task: Experiment, bag: Path, found: Any) -> tuple[str, tuple
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
     wrong = [f"  {one}" for section in found.sections for one in section.wrong]
-    stated = "\n".join([text(task, result), *["", "Problems"][: 2 * bool(wrong)], *wrong])
+    stated = "\n".join([text(task, result), *["", "Problems of the recording"][: 2 * bool(wrong)], *wrong])
     missed = tuple(f"{row.quantity}: MISSED" for row in result.rows if not row.agrees)
     return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed
 

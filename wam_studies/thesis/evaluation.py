@@ -115,8 +115,6 @@ def function_of(evaluation: str) -> Evaluation:
 
 def text(experiment: Experiment, result: Result) -> str:
     """The result as plain text."""
-    verdict = (
-        "all quantities are within their bounds" if result.agrees else "NOT all quantities are within their bounds"
-    )
+    verdict = f"{'all' if result.agrees else 'NOT all'} quantities of this table are within their bounds"
     remarks = "".join(f"\n{remark}" for remark in result.remarks)
     return f"{experiment.title} (section {experiment.section})\n\n{plain(result.rows)}\n{remarks}\n{verdict}"
