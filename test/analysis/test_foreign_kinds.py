@@ -330,6 +330,13 @@ def contradictions() -> list[Case]:
     seconds = [[s._replace(fields=s.fields | zero, stamp=s.stamp + 0.0042) for s in sent[::every]] for every in (1, 10)]
     told = "took turns; the topic is not"
     both = [Case(f"{len(some)} of a second", sqlite, sent + some, {}, told) for some in seconds]
+    time, *_ = moving = motion(200.0, 0.7, 0.5)
+    steps = np.arange(len(time))
+    buzz = np.where(steps % 800 < 100, 3e-6 * (-1.0) ** steps * (1.0 + 0.01 * np.sin(steps)), 0.0)
+    position, velocity, effort = (np.column_stack([one, one]) for one in moving[1:])
+    position[:, 1], velocity[:, 1] = buzz, 0.0
+    quiet = joints("/joint_states", time, ["a", "b"], position=position, velocity=velocity, effort=effort)
+    both.append(Case("one that buzzes", by_rosbags, quiet, sine(0.7, 0.5) | FRICTION))
     others = [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), scaled(0.85, sqlite, 200.0), *both]
     scales = [
         *others,

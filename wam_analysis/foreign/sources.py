@@ -14,7 +14,7 @@ from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.runs import after_gaps, noise, usual_steps
-from wam_analysis.thresholds import SHAFT, STREAM
+from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
@@ -273,19 +273,25 @@ def _is_besides(time: Numbers, own: Mask) -> bool:
 def alternates(source: Source) -> bool:
     """Whether a quantity jumps away and back from message to message, as where two publishers share a topic.
 
-    No motion does: it would have to be faster than 0.45 of the rate of the messages.  A force may, in some messages.
+    Two messages away on either side a value is near one of both: at the turn of a fast vibration it is near none.
     """
     for quantity in source.values:
         values = source.only(quantity).values[quantity]
         if len(values) < SHAFT.fewest_samples:
             continue
-        once, twice = (np.abs(values[n:] - values[:-n]) for n in (1, 2))
+        before, last, here, then, after = (values[i : len(values) - 4 + i] for i in range(5))
+        once = np.minimum(np.abs(here - last), np.abs(then - here))
+        near = [
+            np.minimum(np.abs(far - here), np.abs(far - next_to)) for far, next_to in ((before, last), (after, then))
+        ]
+        twice = np.abs(then - last)
         finest = max(
             float(np.median(twice)),
             float(np.min(twice, initial=math.inf, where=twice > 0.0)) if np.any(twice) else 0.0,
             STREAM.loud * np.finfo(float).eps * float(np.max(np.abs(values))),
+            CYCLE.still_shaft / STREAM.alternates if quantity == "position" else 0.0,
         )
-        away = np.minimum(once[1:], once[:-1]) > STREAM.alternates * np.maximum(twice, finest)
+        away = once > STREAM.alternates * np.maximum(np.maximum(*near), np.maximum(twice, finest))
         if np.mean(away) > (STREAM.repeated / 2.0 if quantity == "position" else 0.5):
             return True
     return False
