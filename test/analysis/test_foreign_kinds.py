@@ -281,7 +281,7 @@ def brief_rests() -> list[Case]:
         way = np.where(np.arange(len(phase)) * faster / rate % 2.8 < 1.4, 1.0, -1.0)
         position = 0.3 * way * np.cos(math.pi * np.minimum(phase, 1.0))
         sent = joints("/joint_states", np.arange(len(phase)) / rate, ["a"], position=position[:, None])
-        said = f"a: always in motion (a rest counts from {told} s, half the time between two turns)."
+        said = f"a: always in motion (shorter rests than {told} s do not count, half the time between two turns)."
         return Case(f"{faster:g}", write, sent, {}, "", NOTHING, (said,))
 
     return [resting(by_rosbags, 100.0, 1.0, "0.505"), resting(sqlite, 1000.0, 10.0, "0.0505"),

@@ -18,7 +18,7 @@ from wam_theory.verdicts import Verdict
 
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
 WHOSE = "Forces are along the command: measured by the force loop, estimated by the contact estimator."
-NOT_APPLIED, ELSE = "Not applied, the arm held its position", "Reported by the force loop"
+NOT_APPLIED, ELSE = "The arm held its position instead", "Reported by the force loop"
 STICTION = (
     "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
 )
@@ -63,7 +63,8 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
         for one in reactions:
             what = NOT_APPLIED if one.holds else doubtful if one.name is Code.REFUSED else ELSE
             event = "from" if what is doubtful else f"{one.name.words} at"
-            alike[what].setdefault((name, one.name), f"{name} ({event} {(one.begin - zero) / 1e9:.2f} s)")
+            lasting = f", for {(one.end - one.begin) / 1e9:.2f} s" * (what is NOT_APPLIED)
+            alike[what].setdefault((name, one.name), f"{name} ({event} {(one.begin - zero) / 1e9:.2f} s{lasting})")
     return [f"{what}: {'; '.join(named.values())}." for what, named in alike.items() if named]
 
 
@@ -71,7 +72,8 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     """How far the held forces were from the commanded ones, in a sentence."""
     held = [one for one in held if not one.hold.is_short]
     known = [one for one in held if math.isfinite(one.best.smallest)]
-    applied = [one for one in known if one.largest >= FORCE.touch * one.hold.commanded]
+    touching = [one for one in known if one.largest >= FORCE.touch * one.hold.commanded]
+    applied = [one for one in touching if not one.hold.is_refused]
     if not known:
         return ()
     text = f"Forces: {len(applied)} of {len(held)} applied"
@@ -79,7 +81,7 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
         worst = max(applied, key=lambda one: one.best.smallest / one.hold.commanded)
         whose = "" if len(worst.true) else "measured "
         text += f", largest {whose}error {100.0 * worst.best.smallest / worst.hold.commanded:.1f} %"
-    touched = [one.hold.name for one in applied]
+    touched = [one.hold.name for one in touching]
     free = ", ".join(one.hold.name for one in known if one.hold.name not in touched)
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 

@@ -75,7 +75,7 @@ class Sticking(NamedTuple):
         if not self.slips:
             return "never moved"
         turns = ", half the time between two turns" * self.is_turning
-        counted = f"a rest counts from {shown(self.shortest, 's')}{turns}"
+        counted = f"shorter rests than {shown(self.shortest, 's')} do not count{turns}"
         if not self.stuck and self.slips == 1:
             return f"always in motion ({counted})"
         return f"at rest for {100.0 * self.stuck:.0f} % of the time ({counted}), moved {times(self.slips)}"

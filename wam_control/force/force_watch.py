@@ -231,7 +231,8 @@ class ForceWatch:
             return [holding(Code.REFUSED, "error", **values)]
         # what is off already leaves less of the tolerance to what is not known; what is off by all of it is not reached
         off = error if abs(error) <= known.tolerance else 0.0
-        is_doubtful = math.hypot(known.errors.size, off) > known.tolerance and self.touch.is_there
+        values["error"] = error = math.hypot(known.errors.size, off)
+        is_doubtful = error > known.tolerance and self.touch.is_there
         lasting = own.limits.settling_time
         is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
         return [warning(Code.REFUSED, "uncertain", **values)] if is_on else []
