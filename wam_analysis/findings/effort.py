@@ -7,7 +7,7 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import rest_speed
-from wam_analysis.foreign.sources import Piece, Source, pieces, rests, velocity_fit, ways
+from wam_analysis.foreign.sources import Piece, Source, pieces, rests, ways
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -103,7 +103,7 @@ def contradiction(source: Source) -> str:
     """
     if not {"position", "velocity"} <= source.values.keys() or rests(source):
         return ""
-    factor, _ = velocity_fit(source)
+    factor = source.velocity_factor
     if abs(factor - 1.0) > SHAFT.agree:
         return (
             f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "

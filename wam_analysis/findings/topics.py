@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Section, counted, shown, times
-from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces, velocity_fit
+from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -65,7 +65,7 @@ def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Sou
         if slow and values.size and quantity in ("position", "velocity"):
             values = values[:, slow]
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
-        is_rate = quantity == "velocity" and any(abs(velocity_fit(one)[0] - 1.0) <= SHAFT.agree for one in found)
+        is_rate = quantity == "velocity" and any(abs(one.velocity_factor - 1.0) <= SHAFT.agree for one in found)
         if largest > most and quantity not in given.units and not is_rate:
             taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, more than most robots"
             smaller: dict[tuple[float, str], str] = {}  # each in its first spelling

@@ -70,6 +70,7 @@ class Source(NamedTuple):
     values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; NaN where a message has none.
     units : by quantity.
     treated : what was done to the raw values.
+    velocity_factor : see `velocity_fit`; NaN where the velocity was left out.
     """
 
     label: str
@@ -84,6 +85,7 @@ class Source(NamedTuple):
     values: dict[str, Numbers]
     units: dict[str, str]
     treated: tuple[Treated, ...]
+    velocity_factor: float = math.nan
 
     def only(self, *quantities: str) -> "Source":
         """The source with those of some quantities that it has, in the messages that have all of them."""
@@ -347,11 +349,12 @@ def _treated(one: Source) -> Source:
             whole = np.cumsum(jumps)[row_at(shown.time, one.time)]
             values["position"] = values["position"] - whole
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
-    _, unfit = (math.nan, None) if one.is_command else velocity_fit(one._replace(values=values))
-    if unfit:
+    factor, unfit = velocity_fit(one._replace(values=values))
+    if unfit and not one.is_command:
         del values["velocity"]
         treated.append(unfit)
-    return one._replace(values=values, treated=tuple(treated))
+        factor = math.nan
+    return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
 
 
 def _held_over(value: Numbers) -> Mask:
