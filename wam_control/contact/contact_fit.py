@@ -291,7 +291,8 @@ class ContactFit:
         if not weight:
             return [], math.inf
         size = abs(gram[0][AXIAL]) / (gram[AXIAL][AXIAL] + scale**-2) + CONTACT.smallest_force
-        arm, length, found, left = math.sqrt(0.5) * self._radius[i] * size, end - start, [], math.inf
+        arm, length, rarity = math.sqrt(0.5) * self._radius[i] * size, end - start, self._log_rarity(size)
+        found, left = list[Piece](), math.inf
         pieces = [([(3, arm)], [(4, arm)], start + 0.5 * length, length, 1)]
         for slope in CONTACT.end_slopes:
             lean, far = slope * size, slope * size * end
@@ -300,7 +301,7 @@ class ContactFit:
             )
         for one, two, x, width, count in pieces:
             ((rr, ra), (_, aa)), volume = widened(gram, one, two, slice(0, None, AXIAL))
-            value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - self._log_rarity(size)
+            value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
             found.append((value + math.log(weight / (count * width)), x, width, i, True))
             left = min(left, rr - ra * ra / (aa + scale**-2))
         return found, left
