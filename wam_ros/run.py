@@ -69,7 +69,7 @@ def end_of_delivery(context: Context) -> float:
 def prepare_logging_directory() -> None:
     """Let rclpy log somewhere even where HOME is missing or cannot be written."""
     if not os.environ.keys() & {"ROS_LOG_DIR", "ROS_HOME"}:
-        directory = Path(os.environ.get("HOME", os.devnull), ".ros", "log")
+        directory = Path(os.environ.get("HOME") or os.devnull, ".ros", "log")
         with contextlib.suppress(OSError):
             directory.mkdir(parents=True, exist_ok=True)
         if not os.access(directory, os.W_OK):
