@@ -18,7 +18,7 @@ from wam_cli.options import (
     timed,
 )
 from wam_control.task.scenario import load_for
-from wam_description.interface import Interface
+from wam_description.interface import declared
 from wam_description.nodes import ONE
 from wam_ros.bring_up import Processes, process_of, run_together
 from wam_ros.process_signals import Stop, end_at_once_on_signals
@@ -70,7 +70,7 @@ def run(given: argparse.Namespace) -> int:
         if processes == ONE:
             print(f"{started} this process; Ctrl-C stops them", flush=True)
             failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)
-            names = ", ".join(Interface(configuration.shared).names)
+            names = ", ".join(declared(entry).name for entry in configuration.shared.nodes)
             ended = {} if stop.is_set else {names: int(bool(failure))}
         else:
             with Processes(configuration, given.namespace, given.log_level, processes) as stack:
