@@ -151,14 +151,17 @@ class WorldPush(NamedTuple):
 
 
 def likeliest_link(body: RigidBody, q: Sequence[float], torques: Array) -> Array:
-    """Jacobian (3, n) of the middle of the link of which one force explains torques (n,), N m, best."""
+    """Jacobian (3, n) of the far end of the link of which one force explains torques (n,), N m, best.
+
+    Elsewhere on this link, a force needs to be larger for the same torques.
+    """
     covers = body.arm.covers
-    middles = [
-        body.point_jacobian(q, name, (FORCE.middle * length, 0.0, 0.0))
+    ends = [
+        body.point_jacobian(q, name, (length, 0.0, 0.0))
         for name, length in zip(covers.names, covers.length, strict=True)
     ]
     return min(
-        middles, key=lambda one: float(np.linalg.norm(torques - one.T @ np.linalg.lstsq(one.T, torques, rcond=None)[0]))
+        ends, key=lambda one: float(np.linalg.norm(torques - one.T @ np.linalg.lstsq(one.T, torques, rcond=None)[0]))
     )
 
 

@@ -29,7 +29,6 @@ class ForceThresholds:
     touch: float = 0.2  # of the commanded force, from which something is touched
     bouncing_time: float = 0.1  # s after the first touch, in which an impact turns the force
     conflict_time: float = 0.1  # s, after which another contact counts: an impact looks like one
-    middle: float = 0.5  # of a link that may be touched, where its force is taken to be
     # speed along a force
     settled: float = 3.0  # time constants within the settling time
     creep: float = 3e-3  # m, least way within the settling time: slower, friction moves the arm in jerks
