@@ -8,10 +8,11 @@ from rclpy.subscription import Subscription
 from wam_description.event import Event, fault
 from wam_description.event_text import sentence
 from wam_ros.limits import NODE_LIMITS
+from wam_ros.local_bus import Message
 from wam_ros.messages import Refused, message_type
 from wam_ros.ros_topics import listening, topic_name
 from wam_ros.tolerance import TolerantNode
-from wam_ros.wire import decoder, stamp_in
+from wam_ros.wire import decoder, requirement, stamp_in
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
 
@@ -107,24 +108,41 @@ class Inlets:
         accepts : whether a message of a stamp is of interest; others are not decoded.
         """
         node, health = self._node, self._node.health
-        decode = decoder(node.interface.topics[topic], node.shared, arrays)
+        row = node.interface.topics[topic]
+        decode, require_usable = decoder(row, node.shared, arrays), requirement(row, node.shared, arrays)
 
-        def receive(data: bytes) -> None:
+        def receive(stamp: int, given: Any, value_of: Callable[[Any], Any]) -> None:
             try:
                 # what a second publisher sends does not come by the bus
                 if (topic in health.problems or (not is_local and claim.count > 1)) and (rivals := self._look(topic)):
                     raise Refused(sentence(rivals))
-                stamp = stamp_in(data)
                 if accepts(stamp):
-                    take(stamp, decode(data))
+                    take(stamp, value_of(given))
             except Refused as reason:
                 health.refuse(topic, str(reason), reason.is_late)
 
-        is_local = self.listen(topic, receive)
+        is_local = self.listen(
+            topic,
+            lambda data: receive(stamp_in(data), data, decode),
+            lambda message: receive(message.stamp, message.value, require_usable),
+        )
         self.claims[topic] = claim = PublisherClaim(node, topic, self.subscriptions[topic])
 
-    def listen(self, topic: str, receive: Callable[[bytes], None]) -> bool:
-        """Subscribe to the bytes of messages; whether they come without the middleware, see `wam_ros.local_bus`."""
+    def listen(
+        self, topic: str, receive: Callable[[bytes], None], take: Callable[[Message], None] = lambda message: None
+    ) -> bool:
+        """Subscribe to the bytes of messages.
+
+        Parameters
+        ----------
+        topic : name in the table of topics.
+        receive : called with them, where they come from the middleware.
+        take : called with the message, where it comes without it, see `wam_ros.local_bus`.
+
+        Returns
+        -------
+        whether messages come without the middleware.
+        """
         node, bus = self._node, self._node.outlets.bus
         row = node.interface.topics[topic]
         profile, name = listening(row), topic_name(node, row)
@@ -132,7 +150,7 @@ class Inlets:
             profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
         is_local = bus is not None and not row.latched and bus.carries(node.interface.publishers(topic))
         if is_local:
-            bus.subscribe(node.resolve_topic_name(name), node.bearing(receive, f"a message on {topic}"))
+            bus.subscribe(node.resolve_topic_name(name), node.bearing(take, f"a message on {topic}"))
             profile.depth = 1
         subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
         if is_local:

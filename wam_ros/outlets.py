@@ -43,14 +43,15 @@ class Outlets:
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
-        self.send(topic, self._encoders[topic](stamp, value))
+        data = self._encoders[topic](stamp, value)
+        self.send(topic, data)
+        if self.bus is not None:
+            self.bus.send(self.full[topic], stamp, value, data)
 
     def send(self, topic: str, message: Any) -> None:
         """Publish a message, or its bytes."""
         self.published[topic] += 1
         self._publishers[topic].publish(message)
-        if self.bus is not None:
-            self.bus.send(self.full[topic], message)
 
     def is_taken(self, topic: str, within: float = 0.0) -> bool:
         """Whether all listeners have taken what was published on a topic, waiting for that so long, s."""

@@ -160,7 +160,7 @@ class RunningArm:
         for topic, row in rows.items():
             take = self._taking(topic)
             if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
-                bus.subscribe(self.node.resolve_topic_name(topic), take)
+                bus.subscribe(self.node.resolve_topic_name(topic), lambda message, take=take: take(message.data))
             else:
                 name = topic_name(self.node, row)
                 self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)

@@ -71,18 +71,28 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
 
     if topic.type == TRAJECTORY:
         return _repeated(slowly)
-    find, defect_of = _finder(topic, shared.arm), defect_finder(topic, shared.arm, arrays)
-    masked = mask(arrays) if topic.type == JOINT_STATE else None
+    find, require_usable = _finder(topic, shared.arm), requirement(topic, shared, arrays)
 
     def decode(data: bytes) -> Any:
         value = find(data)
-        if value is None:
-            value = slowly(data)
+        return require_usable(slowly(data) if value is None else value)
+
+    return decode
+
+
+def requirement(topic: Topic, shared: Shared, arrays: str) -> Callable[[Any], Any]:
+    """What a value of a topic must fulfil, as a function that refuses others; parameters as of `decoder`."""
+    if topic.type == TRAJECTORY:  # its reader has looked at it
+        return lambda value: value
+    defect_of = defect_finder(topic, shared.arm, arrays)
+    masked = mask(arrays) if topic.type == JOINT_STATE else None
+
+    def required(value: Any) -> Any:
         if defect := defect_of(value):
             raise Refused(defect)
         return masked(value) if masked else value
 
-    return decode
+    return required
 
 
 def status_of(data: bytes) -> NodeStatus:

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable
 
 from wam_ros.limits import NODE_LIMITS
-from wam_ros.local_bus import LocalBus
+from wam_ros.local_bus import LocalBus, Message
 
 
 class FalseExecutor:
@@ -24,12 +24,12 @@ def test_nodes_that_answer_each_other_without_end_leave_turns_to_everything_else
     executor, count, others = FalseExecutor(), [0], list[int]()
     bus = LocalBus(executor, ["a"])
 
-    def answer(data: bytes) -> None:
+    def answer(message: Message) -> None:
         count[0] += 1
-        bus.send("/ping", data)
+        bus.send("/ping", *message)
 
     bus.subscribe("/ping", answer)
-    bus.send("/ping", b"")
+    bus.send("/ping", 1, None, b"")
     executor.create_task(lambda: others.append(count[0]))
     for _ in range(3):
         executor.spin_once()
