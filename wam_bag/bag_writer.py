@@ -56,12 +56,10 @@ class Packing(NamedTuple):
     ----------
     chunk_size : bytes of a chunk.
     level : of its compression, 1 to 22.
-    is_timed : whether a chunk is finished every half second of wall time; if not, equal messages give equal files.
     """
 
     chunk_size: int = CHUNK_SIZE
     level: int = FAST
-    is_timed: bool = True
 
 
 LIVE: Final = Packing()
@@ -92,14 +90,16 @@ class BagWriter:
     def __init__(self, path: Path, split: Split = WHOLE, packing: Packing = LIVE) -> None:
         self.path = path
         self.closed = False
-        self._split, self._packing = split, packing
+        self._packing = packing
+        self._largest = split.size or math.inf  # bytes of a file
+        self._longest = round(split.seconds * 1e9) or math.inf  # ns in a file
         self._files: list[FileSummary] = []
         self._topics: list[dict[str, Any]] = []
         self._channels: dict[str, int] = {}
         self._lengths: dict[str, ExactLength] = {}
         self._counts: Counter[int] = Counter()  # by channel id, of the files that are finished
         self._schemas: dict[str, int] = {}
-        self._next_flush = 0.0 if packing.is_timed else math.inf
+        self._next_flush = 0.0
         self._file_begin: int | None = None
         _make(path)
         try:
@@ -155,19 +155,18 @@ class BagWriter:
         if self._file_begin is None:
             self._file_begin = log_time
         try:  # not the context manager, which would take as long as all the rest
-            if self._is_full(log_time):
+            if self._writer.position >= self._largest or log_time - self._file_begin >= self._longest:
                 self._next_file(log_time)
             self._writer.add(channel, log_time, publish_time, sequence, data)
-            if time.monotonic() >= self._next_flush:
-                self._flush()
         except OSError as error:
             self._give_up(error)
 
     def flush_when_due(self) -> None:
-        """Finish the chunk every half second of wall time; call it also while no message arrives."""
+        """Finish the chunk every half second of wall time; without calls, equal messages give equal files."""
         if time.monotonic() >= self._next_flush and not self.closed:
+            self._next_flush = time.monotonic() + FLUSH_PERIOD
             with self._closing_on_failure():
-                self._flush()
+                self._writer.flush()
 
     def check(self) -> None:
         """Look whether what is written still is where the bag is; call it every few tenths of a second.
@@ -250,17 +249,6 @@ class BagWriter:
         channel = self._channels.setdefault(topic["name"], len(self._channels) + 1)
         self._writer.define(Schema(number, schema(kind), "ros2msg", kind))
         self._writer.define(Channel(channel, topic["name"], "cdr", metadata, number))
-
-    def _flush(self) -> None:
-        self._next_flush = time.monotonic() + FLUSH_PERIOD
-        self._writer.flush()
-
-    def _is_full(self, log_time: int) -> bool:
-        size, seconds = self._split
-        if size and self._writer.position >= size:
-            return True
-        begin = log_time if self._file_begin is None else self._file_begin
-        return bool(seconds) and log_time - begin >= round(seconds * 1e9)
 
     def _next_file(self, log_time: int) -> None:
         self._writer.flush()

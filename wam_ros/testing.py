@@ -28,7 +28,7 @@ from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
-from wam_ros.local_bus import BUSES
+from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
@@ -158,12 +158,14 @@ class RunningArm:
         self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
         bus = BUSES[self.context] if self._is_lockstep else None
         for topic, row in rows.items():
-            take = self._taking(topic)
-            if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
-                bus.subscribe(self.node.resolve_topic_name(topic), lambda message, take=take: take(message.data))
-            else:
-                name = topic_name(self.node, row)
-                self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
+            self._listen_to(row, self._taking(topic), bus)
+
+    def _listen_to(self, row: Topic, take: Callable[[bytes], None], bus: LocalBus | None) -> None:
+        if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(row.name)):
+            bus.subscribe(self.node.resolve_topic_name(row.name), lambda message: take(message.data))
+        else:
+            name = topic_name(self.node, row)
+            self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 
     def _taking(self, topic: str) -> Callable[[bytes], None]:
         kept = self._recorded.data[topic]

@@ -1,6 +1,5 @@
 """Bags that were not closed, or are damaged, made whole; disks that fill up."""
 
-import math
 import os
 import random
 import shutil
@@ -38,13 +37,11 @@ def record(path: Path, samples: list[Sample], split: Split = WHOLE) -> BagWriter
     bag = BagWriter(path, split)
     for topic, kind in dict.fromkeys((sample.topic, sample.type) for sample in samples):
         bag.add_topic(topic, kind, QOS)
-    bag._next_flush = math.inf
     for k, sample in enumerate(samples, 1):
         bag.write(sample.topic, sample.data, sample.time, sample.time, k)
         if k % 10 == 0:
             bag._next_flush = 0.0
             bag.flush_when_due()
-            bag._next_flush = math.inf
     return bag
 
 

@@ -498,6 +498,7 @@ def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> No
     found = machine(tmp_path, "/wam/contact/in_contact", mode="realtime")
     bag = found._bag
     found.receive("/wam/contact/in_contact", b"\0\1\0\0\1", 1, 1, 1)
+    found.flush()
     assert not found.failure
     fill_disk(bag)
     bag._writer._chunk_size = 1

@@ -14,7 +14,7 @@ from wam_bag.losses import CUT
 from wam_bag.metadata import profiles
 from wam_studies.thesis.definition import SampleDefinition
 
-PACKING: Final = Packing(4 * 2**20, 19, is_timed=False)  # the strongest level that needs no more memory to read
+PACKING: Final = Packing(4 * 2**20, 19)  # the strongest level that needs no more memory to read
 OWN: Final = "rosbag2"  # metadata record that describes the file it is in, and so is written again
 
 
