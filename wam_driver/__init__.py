@@ -18,7 +18,7 @@
 - dry_friction: dry friction of all motors and joints, by these laws
 - circuits: creep, slack, torque and tension of the cable circuits
 - surfaces: contact forces of all that a cover can touch
-- reach: whether anything can be touched at all, and that nothing is inside a link at power-up
+- free_start: that nothing is inside a link at power-up
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
 - bus: the driver of a real WAM on its CAN bus, and a simulator of that bus

@@ -16,7 +16,7 @@ from typing import SupportsIndex
 
 import mujoco
 import numpy as np
-from mujoco import mj_step, mj_step1, mj_step2
+from mujoco import mj_step1, mj_step2
 
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
@@ -29,11 +29,11 @@ from wam_description.world import World
 from wam_driver.circuits import CableCircuits
 from wam_driver.compiled_steps import compiled_steps
 from wam_driver.dry_friction import DryFriction
+from wam_driver.free_start import require_free_start
 from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
 from wam_driver.objects import MovingObstacle, TrueObjects
 from wam_driver.pusher import Pusher
-from wam_driver.reach import require_free_start
 from wam_driver.step_size import require_fitting_step
 from wam_driver.surfaces import Mover, Surfaces
 from wam_driver.thresholds import PLANT
@@ -131,8 +131,8 @@ class Plant:
         self._advance = compiled_steps(self.model, self.data, *shared, step) if is_plain else None
         # to look them up in each step costs 3 % of it
         bounds, after_step = (*self._friction.bounds, self._friction.direction), self._circuits.after_step
-        touching = self._loads.pushes, self._surfaces.may_touch, movers
-        self._in_steps = self.model, self.data, *touching, self._view.velocities.tolist, *bounds, after_step
+        velocities = self._view.velocities.tolist
+        self._in_steps = self.model, self.data, self._loads.pushes, movers, velocities, *bounds, after_step
         self._rest()
         require_free_start(self.model, self.data, arm, world)
         self._kept = self._view.position.tolist(), self._view.plastic.tolist()
@@ -284,7 +284,7 @@ class Plant:
 
     def _advance_in_python(self, count: int) -> list[float]:
         """Advance by steps with the torque that is set; velocities of rotors and joints before the last, rad/s."""
-        model, data, pushes, may_touch, movers, velocities, lows, highs, direction, after_step = self._in_steps
+        model, data, pushes, movers, velocities, lows, highs, direction, after_step = self._in_steps
         velocity = before = velocities()
         for _ in range(count):
             if self._is_set:
@@ -297,17 +297,14 @@ class Plant:
             for mover in movers:
                 mover.lead(data.time)
             before = velocity
-            if may_touch or pushes:
-                mj_step1(model, data)
-                if pushes:
-                    self._loads.apply_pushes()
-                if data.ncon:
-                    self._surfaces.apply()
-                mj_step2(model, data)
-                if pushes:
-                    self._view.applied.fill(0.0)
-            else:  # nothing to do between the halves
-                mj_step(model, data)
+            mj_step1(model, data)
+            if pushes:
+                self._loads.apply_pushes()
+            if data.ncon:
+                self._surfaces.apply()
+            mj_step2(model, data)
+            if pushes:
+                self._view.applied.fill(0.0)
             velocity = velocities()
             if after_step and after_step(direction, velocity):
                 self._is_set = False

@@ -28,14 +28,12 @@ class Pusher:
     name : of the body and its geom.
     words : how hard which cover is pushed, and by whom.
     is_pressing : whether it pushes now.
-    surface : stiffness, N/m, damping, N s/m, hardening, 1/m, of its surface.
     velocity : (3,), m/s, of its surface in the base frame.
     """
 
     def __init__(self, model: Any, data: Any, arm: Arm, given: Any, step: float) -> None:
         self.name = given.name
         self.words, self.is_pressing = f"{given.force:.4g} N on {given.cover} by {self.name}", False
-        self.surface = (given.stiffness, given.damping, 0.0)
         self.velocity = np.zeros(3)
         self._model, self._data, self._step = model, data, step
         self._mocap = int(model.body(self.name).mocapid[0])

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs
 from wam_description.world import World
-from wam_driver.reach import within_reach
 from wam_driver.thresholds import PLANT
 
 Array = NDArray[np.float64]
@@ -42,7 +41,6 @@ class Surfaces:
     ----------
     laws : of each pair its geoms, the stiffness, N/m, damping, N s/m, and hardening, 1/m, of the contact, the number of
         its rows, and whether several contacts share the stiffness.
-    may_touch : whether any pair is within reach of each other; where none is, there is never anything to `apply`.
     """
 
     def __init__(self, model: Any, data: Any, arm: Arm, world: World, movers: Sequence[Mover], step: float) -> None:
@@ -54,7 +52,6 @@ class Surfaces:
         self._mover = {model.geom(mover.name).id: mover for mover in movers}
         given = {one.name: one for one in contact_pairs(arm, world)}
         laws = [given[model.pair(i).name] for i in range(model.npair)]
-        self.may_touch = any(within_reach(model, *pair) for pair in pairs)
         self.laws: list[SurfaceLaw] = [
             (*pair, float(law.stiffness), float(law.damping), float(law.hardening), size, law.is_shared)
             for pair, law, size in zip(pairs, laws, model.pair_dim.tolist(), strict=True)
