@@ -133,24 +133,28 @@ class AdaptedNode(StackNode):
         if self._is_realtime and self.peers.absent and getattr(self.node, "starts_with_all", False):
             return  # in lockstep the driver waits for all
         self.health.counts["steps"] += 1
-        self._worked, name, began = inputs.stamp, self._declaration.name, time.monotonic()
-        if (pause := began - self._began) > self.shared.ages.feedback:
-            self._pause = pause, began
-        self._began = began
-        STEPS.begin(name, began)
+        self._worked = inputs.stamp
         try:
-            try:
-                outputs = feed.work(inputs)
-            finally:
-                if STEPS.end(name, began):
-                    self.health.repeat()
-            self._finish(inputs, outputs)
+            self._finish(inputs, self._timed(inputs, feed) if self._is_realtime else feed.work(inputs))
         except Exception:
             self._failing.add(feed.work)
             raise
         self._failing.discard(feed.work)
         if feed.essential and self._is_realtime:
             self._watch(feed)
+
+    def _timed(self, inputs: Inputs, feed: Feed) -> Outputs:
+        """What the node returns; a step that takes long, and a pause before it, are noted."""
+        name, began = self._declaration.name, time.monotonic()
+        if (pause := began - self._began) > self.shared.ages.feedback:
+            self._pause = pause, began
+        self._began = began
+        STEPS.begin(name, began)
+        try:
+            return feed.work(inputs)
+        finally:
+            if STEPS.end(name, began):
+                self.health.repeat()
 
     def _finish(self, inputs: Inputs, outputs: Outputs) -> None:
         """Make the requests of the step, then publish what it returned; report what it has refused."""
