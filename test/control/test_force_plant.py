@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from arms import BODY, CONFIGURATION, WAM
 
-from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of, task_of
+from wam_control.force.force_loop_parameters import ForceLoopParameters, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_control.force.task import AxisKind, TaskCommand, joint_axes
 from wam_control.task.scenario import Push, ScenarioStep
@@ -123,7 +123,7 @@ def test_the_guard_counts_a_payload() -> None:
     for mass in (0.0, 0.5):
         loaded = replace(WAM, payload=mass)
         guard = StabilityGuard(
-            loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, sensing_of(own)
+            loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, own.sensing_fed_back
         )
         contacts = guard.contacts(own.guard.posture, OUTER, 0.28, 0.0)
         scales.append(min(guard.scales(task_of(own), contacts)))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from test_force_belief import POSES, axis_at
 from test_force_loop import ARM, BODY, CONFIGURATION, DRIVEN, DT, POSE, STILL, down, force_loop
 
-from wam_control.force.belief import WorldTorques
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_loop import ForceInput, ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -155,13 +154,13 @@ def test_without_a_lever_an_arm_holds() -> None:
 
 
 def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
-    q, sd, none = POSES[0], np.full(4, 0.015), np.zeros(4)
+    q, sd = POSES[0], np.full(4, 0.015)
     jacobian, pushed = BODY.tool_jacobian(q), PushedArm(BODY)
 
     def step(force: float, is_bouncing: bool = False, periods: int = 1) -> list[float]:
-        torques = WorldTorques(none + force * UP @ jacobian, none, None, sd)
+        torques = force * UP @ jacobian
         for _ in range(periods):
-            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, (20.0, LIMIT), True, is_bouncing, 0.03, OWN, DT)
+            rows = pushed.step(q, [], torques, sd, NO_CONTACT, 0.0, (20.0, LIMIT), True, is_bouncing, 0.03, OWN, DT)
         return [row.speed for row in rows]
 
     def direct(force: float) -> float:
@@ -187,11 +186,10 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
 
 
 def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> None:
-    q, none, pushed = POSES[0], np.zeros(4), PushedArm(BODY)
+    q, sd, pushed = POSES[0], np.full(4, 0.015), PushedArm(BODY)
     axis = axis_at(q, 40.0)
     for k in range(400):
         size = 40.0 if k < 100 else max(5.0, 40.0 - 0.2 * (k - 100))
-        torques = WorldTorques(-size * axis.along, none, None, np.full(4, 0.015))
         allowed = 1.5 * (40.0 if k < 100 else 5.0)
-        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, (allowed, LIMIT), True, False, 0.03, OWN, DT)
+        pushed.step(q, [axis], -size * axis.along, sd, NO_CONTACT, 0.0, (allowed, LIMIT), True, False, 0.03, OWN, DT)
         assert pushed.event is None

@@ -11,7 +11,6 @@ import pytest
 from arms import BODY, CONFIGURATION, SHARED, WAM
 
 from wam_control.force.force_loop import ForceInput, ForceLoop, ForceLoopParameters, ForceOutput
-from wam_control.force.force_loop_parameters import sensing_of
 from wam_control.force.force_loop_parameters import task_of as task_of_parameters
 from wam_control.force.stability_guard import GuardedForces, GuardedTask, StabilityGuard
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes, line_axes, table_of, task_of
@@ -289,7 +288,7 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
 
 def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, GuardedTask, GuardedForces]:
     """What the guard considers of a task."""
-    guard = StabilityGuard(WAM, SHARED.servo, SHARED.timing, GIVEN.guard, sensing_of(GIVEN))
+    guard = StabilityGuard(WAM, SHARED.servo, SHARED.timing, GIVEN.guard, GIVEN.sensing_fed_back)
     seen: list[GuardedForces] = []
 
     def factor(where: Callable[[], list[GuardedForces]], dt: float) -> tuple[float, bool]:

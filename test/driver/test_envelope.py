@@ -256,8 +256,9 @@ def admitted(
     force: ForceCommand | None = None,
     posture: Sequence[float] | None = None,
     torque: Sequence[float] | None = None,
-) -> Any:
-    return admission.step(own, ARM.joints.start, force, posture, torque, DT)
+) -> CommandAdmission:
+    admission.step(own, ARM.joints.start, force, posture, torque, DT)
+    return admission
 
 
 def test_a_posture_beyond_the_joint_limits_is_refused_by_name_and_the_last_one_held() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from wam_control.force.axes import Links, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.contact_place import ForcePlace
+from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import TaskCommand
 from wam_control.force.thresholds import FORCE
@@ -23,7 +24,7 @@ def tries(
     places: Sequence[tuple[float, ForcePlace]],
     axes: TaskAxes,
     joints: Joints,
-    believe: Callable[[Sequence[float], Links], Belief],
+    believe: Callable[[Angles, Links], Belief],
     own: ForceLoopParameters,
 ) -> Iterator[Ways]:
     """After each force that is tried, the way where it would be obeyed with a reserve, else nothing; then `searched`.

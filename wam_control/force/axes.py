@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.contact_place import ForcePlace
-from wam_control.force.force_axis import UNTURNED, ForceAxes, ForceAxis, PressedForce
+from wam_control.force.force_axis import UNTURNED, Angles, ForceAxes, ForceAxis, PressedForce
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
@@ -81,7 +81,7 @@ class TaskAxes:
         self._arm, self._body, self.forces = arm, body, forces
 
     def of(
-        self, q: Sequence[float], task: TaskCommand, places: Sequence[ForcePlace], sides: Sequence[float]
+        self, q: Angles, task: TaskCommand, places: Sequence[ForcePlace], sides: Sequence[float]
     ) -> list[CommandedAxis]:
         """The axes of a task; the force along each is measured with those of the others as unknowns.
 
@@ -110,11 +110,11 @@ class TaskAxes:
             for i in range(len(task.axes))
         ]
 
-    def rotation(self, q: Sequence[float], frame: str) -> Array:
+    def rotation(self, q: Angles, frame: str) -> Array:
         """Rotation (3, 3) of the frame of a command into the base frame."""
         return UNTURNED if frame == BASE else self._body.cover_pose(q, frame).rotation
 
-    def _disturbance(self, q: Sequence[float], axis: TaskAxis, pressed: PressedForce) -> list[Array]:
+    def _disturbance(self, q: Angles, axis: TaskAxis, pressed: PressedForce) -> list[Array]:
         """Torques (n,), N m, by which a force along an axis disturbs the others; a hand has no friction."""
         if axis.joint >= 0 or not axis.is_sensed:
             return []
@@ -124,7 +124,7 @@ class TaskAxes:
 
     def _axis(
         self,
-        q: Sequence[float],
+        q: Angles,
         i: int,
         axes: Sequence[TaskAxis],
         direction: Array,
@@ -136,7 +136,7 @@ class TaskAxes:
         axis = axes[i]
         if axis.joint >= 0:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
-            return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, q[axis.joint])
+            return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, float(q[axis.joint]))
         point = np.array([place.position, *self._arm.covers.aside(place.cover, place.position)])
         at = float(direction.dot(self._body.point(q, place.cover, point)))
         if not axis.is_sensed:

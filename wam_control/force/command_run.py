@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from wam_control.force.axes import CommandedAxis, Links
 from wam_control.force.belief import UNKNOWN
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.feed_forward import FeedForward
-from wam_control.force.force_axis import ForceAxes, Phasors
+from wam_control.force.force_axis import Angles, ForceAxes, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
@@ -102,7 +102,7 @@ class Shaking:
         self._cycle, self._poses = timing.dither_cycle * timing.period, list[Array]()
         self._free: list[tuple[Phasors, Phasors]] | None = None
 
-    def is_watching(self, q: Sequence[float], forces: ForceAxes, servo: Servo, dt: float) -> bool:
+    def is_watching(self, q: Angles, forces: ForceAxes, servo: Servo, dt: float) -> bool:
         """Take a pose (n,), rad, unless there are enough; whether one was taken."""
         if not self._cycle or self._free is not None:
             return False
@@ -206,7 +206,7 @@ class CommandRun:
         """Whether something is touched by one of its forces."""
         return any(one.watch.touch.is_there for one in self.axes)
 
-    def judge(self, q: Sequence[float], measurement: ForceMeasurement, forces: ForceAxes, limit: float) -> None:
+    def judge(self, q: Angles, measurement: ForceMeasurement, forces: ForceAxes, limit: float) -> None:
         """Decide once, for the first axis, whether the torques at rest are those of a touched surface.
 
         What a payload explains may always be one.  Else those above a limit, N m, are no error of the model.
@@ -225,7 +225,7 @@ class CommandRun:
                 return
         self.resting = np.zeros_like(torques)
 
-    def move(self, moved: Array, forces: ForceAxes, q: Sequence[float]) -> None:
+    def move(self, moved: Array, forces: ForceAxes, q: Angles) -> None:
         """Count a motion of the joints (n,), rad: what is touched stays, and the link slides along it."""
         # another motion may lead to what is to be touched
         is_approach = all(one.now.is_force for one in self.axes)

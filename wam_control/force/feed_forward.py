@@ -47,8 +47,8 @@ class FeedForward:
         dt : outer period, s.
         """
         if parameters.friction_feedforward and not parameters.is_estimated:
-            friction = self._countered.step(np.array(self._friction(velocity)), FORCE.friction_time, dt)
-            force = force + parameters.friction_feedforward * friction
+            friction = self._countered.step(self._friction(velocity), FORCE.friction_time, dt)
+            force = force + parameters.friction_feedforward * np.array(friction)
         result: list[float] = force.tolist()
         return result
 

@@ -23,6 +23,7 @@ from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
+Angles = Sequence[float] | Array  # of the joints (n,), rad
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 UNTURNED = np.eye(3)  # rotation of the base frame
 
@@ -164,15 +165,15 @@ class ForceAxes:
         self._friction = np.array(arm.joints.dynamic_friction)
         self._compliance = np.linalg.inv(self._map.at_joints([circuit.stiffness for circuit in arm.circuits]))
 
-    def inertia(self, q: Sequence[float]) -> Array:
+    def inertia(self, q: Angles) -> Array:
         """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
         return self._body.mass_matrix(q) + self._armature
 
-    def moved_inertia(self, q: Sequence[float]) -> Array:
+    def moved_inertia(self, q: Angles) -> Array:
         """The same with rotors: what hits a surface."""
         return self.inertia(q) + self._rotors
 
-    def friction_damping(self, q: Sequence[float], motion: Phasors, frequency: float) -> Array:
+    def friction_damping(self, q: Angles, motion: Phasors, frequency: float) -> Array:
         """Damping of the joints (n,), N m s/rad, that takes as much energy as their dry friction: 4 F/(pi w |x|).
 
         Parameters
@@ -189,7 +190,7 @@ class ForceAxes:
         return damping
 
     def vibration(
-        self, q: Sequence[float], motion: Phasors, frequency: float, damping: Array, servo: Servo
+        self, q: Angles, motion: Phasors, frequency: float, damping: Array, servo: Servo
     ) -> tuple[Phasors, Phasors]:
         """Vibration of the free links (n,), rad, and their receptance, motion per torque on them (n, n), rad/(N m).
 
@@ -213,12 +214,12 @@ class ForceAxes:
         on_cables = np.eye(len(links)) + self._compliance @ _impedance(links, frequency, damping)
         return np.asarray(np.linalg.solve(on_cables, motion), np.complex128)
 
-    def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
+    def lever(self, q: Angles, cover: str, position: float, direction: Array) -> Array:
         """Torque on each joint per force (n,), m, along a direction (3,), base frame, at a position of a cover, m."""
         result: Array = direction.dot(self._jacobian(q, cover, position, direction)[0])
         return result
 
-    def disturbance(self, q: Sequence[float], pressed: PressedForce) -> list[Array]:
+    def disturbance(self, q: Angles, pressed: PressedForce) -> list[Array]:
         """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
 
         Arguments as those of `axis`.
@@ -230,17 +231,17 @@ class ForceAxes:
         friction = self._parameters.friction * size * _across(direction, direction)
         return [(size * direction).dot(jacobian), *friction.dot(jacobian), (position_sd * size * direction).dot(slide)]
 
-    def link_axis(self, q: Sequence[float], cover: str) -> Array:
+    def link_axis(self, q: Angles, cover: str) -> Array:
         """Direction (3,) along a cover, base frame."""
         return self._body.cover_pose(q, cover).rotation[:, 0]
 
-    def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
+    def slide(self, q: Angles, cover: str, position: float, moved: Array) -> float:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
         point = (position, *self.covers.aside(cover, position))
         along = self.link_axis(q, cover)
         return float(along.dot(self._body.point_jacobian(q, cover, point)) @ moved)
 
-    def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array, Array]:
+    def _jacobian(self, q: Angles, cover: str, position: float, normal: Array) -> tuple[Array, Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, the point, and the axis."""
         covers, rotation = self.covers, self._body.cover_pose(q, cover).rotation
         point = np.array([position, *covers.aside(cover, position)])
@@ -263,7 +264,7 @@ class ForceAxes:
         force: Array = across + max(2.0 * most / slope - 1.0, 0.0) * aside
         return force / float(force.dot(direction))
 
-    def axis(self, q: Sequence[float], pressed: PressedForce, others: Sequence[Array] = ()) -> ForceAxis:
+    def axis(self, q: Angles, pressed: PressedForce, others: Sequence[Array] = ()) -> ForceAxis:
         """The axis of a force at a contact.
 
         Parameters

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from wam_control.force.contact_place import pinned_position, torque_of_position
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -13,21 +12,6 @@ from wam_description.arm import Covers
 from wam_description.event import Event, refused
 from wam_description.parts import Joints
 from wam_description.signals import ZERO, ForceCommand
-
-
-class Commands(NamedTuple):
-    """What the force loop has to do in one period.
-
-    Attributes
-    ----------
-    force : commanded force; None where there is none.
-    posture : joint angles to hold (n,), rad.
-    refusals : why a command of this period is not taken, by topic.
-    """
-
-    force: ForceCommand | None
-    posture: list[float]
-    refusals: dict[str, Event]
 
 
 class CommandAdmission:
@@ -43,7 +27,9 @@ class CommandAdmission:
 
     Attributes
     ----------
+    force : that is used; None where there is none.
     posture : joint angles to hold (n,), rad; empty before the first state.
+    refusals : why a command of this period is not taken, by topic.
     """
 
     def __init__(self, joints: Joints, covers: Covers, command_age: float) -> None:
@@ -53,7 +39,8 @@ class CommandAdmission:
 
     def restart(self, q: Sequence[float]) -> None:
         """Hold these joint angles (n,), rad, until another posture is commanded; forget every command."""
-        self._force: ForceCommand | None = None
+        self.force: ForceCommand | None = None
+        self.refusals = dict[str, Event]()
         self._age = 0.0
         self._is_moved = self._has_lapsed = self._is_ignored = False
         self.posture = list(q)
@@ -67,26 +54,26 @@ class CommandAdmission:
         torque: Sequence[float] | None,
         dt: float,
         task: TaskCommand | None = None,
-    ) -> Commands:
+    ) -> None:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
-        pressed = bool(_size(self._force))
-        refusals: dict[str, str] = {}
-        if force is not None and _size(force) < FORCE.smallest_force:
+        pressed = bool(_size(self.force))
+        self.refusals = {}
+        if force is not None and 0.0 < _size(force) < FORCE.smallest_force:
             force = force._replace(force=ZERO)
         reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
         self._age = self._age + dt if reason else 0.0
         if not reason:
-            self._force = force
+            self.force = force
         else:
-            refusals["force_command"] = f"{reason}; the last good command remains in use for {self._command_age:g} s"
-            if self._age > self._command_age or _size(self._force) > own.force_limit:
-                self._force = None
-            if self._force is None:
+            self._refuse("force_command", f"{reason}; the last good command remains in use for {self._command_age:g} s")
+            if self._age > self._command_age or _size(self.force) > own.force_limit:
+                self.force = None
+            if self.force is None:
                 force = None
         if posture is not None and (beyond := self._joints.beyond(posture)):
-            refusals["joint_posture_command"] = f"{beyond}; the last good posture remains in use"
+            self._refuse("joint_posture_command", f"{beyond}; the last good posture remains in use")
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
-        self._add_without_effect(refusals, own.mode, q, force, posture, torque, task)
+        self._refuse_without_effect(own.mode, q, force, posture, torque, task)
         posture = None if self._is_ignored else posture
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
@@ -95,12 +82,12 @@ class CommandAdmission:
         elif has_ended or self._is_moved:
             self.posture = list(q)
         self._is_moved = posture is not None and not self._has_lapsed
-        events = {topic: refused(topic, reason) for topic, reason in refusals.items()}
-        return Commands(self._force, self.posture, events)
 
-    def _add_without_effect(
+    def _refuse(self, topic: str, reason: str) -> None:
+        self.refusals[topic] = refused(topic, reason)
+
+    def _refuse_without_effect(
         self,
-        refusals: dict[str, str],
         mode: str,
         q: Sequence[float],
         force: ForceCommand | None,
@@ -118,11 +105,11 @@ class CommandAdmission:
             ("joint_torque_command", torque is not None),
         )
         for topic, is_useless in useless:
-            if is_useless and topic not in refusals:
+            if is_useless and topic not in self.refusals:
                 reason = f"in the mode {mode}; set force_loop:mode to hybrid, or end the command"
                 if task is not None:
                     reason = f"with a task of {len(task.axes)} axes on {joints} joints; end one of them"
-                refusals[topic] = f"{topic} has no effect {reason}"
+                self._refuse(topic, f"{topic} has no effect {reason}")
 
     def _moves(self, posture: Sequence[float], q: Sequence[float]) -> bool:
         """Whether a posture is another one than before, and not where the arm is."""

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from wam_control.force.advice import tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
-from wam_control.force.belief import Belief, WorldTorques
+from wam_control.force.belief import Belief
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
 from wam_control.force.force_axis import ForceAxes
-from wam_control.force.force_command import CommandAdmission, Commands, beyond
-from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
+from wam_control.force.force_command import CommandAdmission, beyond
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
@@ -46,7 +46,7 @@ from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, warning
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
+from wam_description.signals import BASE, NO_CONTACT, ZERO, Contact, ForceCommand, State, Triple
 
 __all__ = ["ForceCommand", "ForceInput", "ForceLoop", "ForceLoopParameters", "ForceOutput", "by_seriousness"]
 
@@ -131,6 +131,7 @@ class ForceLoop:
         self._measurement = ForceMeasurement(self._body)
         self._pushed = PushedArm(self._body)
         self._velocity, self._q = np.zeros(len(arm.joints.names)), list[float]()
+        self._pose = self._velocity  # the same angles as an array
         self._pressed_at: Array | None = None
         self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
@@ -151,7 +152,7 @@ class ForceLoop:
         parameters.require_fit(arm)
         self._supervision = Supervision(arm, self._servo, self._timing, parameters, tuple(self._q))
         self.parameters = self._supervision.parameters
-        self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, sensing_of(parameters)))
+        self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, parameters.sensing_fed_back))
 
     @property
     def event(self) -> Event:
@@ -207,13 +208,13 @@ class ForceLoop:
     def _has_left(self) -> bool:
         """Whether the arm has moved away from where it last pressed on something."""
         at = self._pressed_at
-        return at is None or bool(np.abs(at - np.array(self._q)).max() > MOTION.left_angle)
+        return at is None or bool(np.abs(at - self._pose).max() > MOTION.left_angle)
 
     def step(self, given: ForceInput) -> ForceOutput:
         """One outer period: the axes of what is commanded, then what is known of them, then the motion, then events."""
         own, joints, dt = self.parameters, given.joints, given.dt
         is_braked, is_first = not any(joints.effort), not self._q
-        self._q = list(joints.position)
+        self._q, self._pose = list(joints.position), np.array(joints.position)
         if is_braked or is_first:
             self._reset()
         given = self._measurable(given)
@@ -226,9 +227,10 @@ class ForceLoop:
             given = given._replace(task=TaskCommand(BASE, torques), torque=None)
         if given.task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
             self._admission.restart(self._q)  # the arm stays where it is
-        commands = self._admission.step(own, self._q, given.command, given.posture, given.torque, dt, given.task)
-        self.refusals = commands.refusals
-        task, key = _task(commands, given.task, own)
+        admitted = self._admission
+        admitted.step(own, self._q, given.command, given.posture, given.torque, dt, given.task)
+        self.refusals = admitted.refusals
+        task, key = _task(admitted.force, given.task, own)
         if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
             self._begin(task, key, given.contact is not None and not contact.cover)
         self._find_axes(task, contact)
@@ -237,13 +239,13 @@ class ForceLoop:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(self._q)))
             self.events = ()
             return ForceOutput([], effort.tolist(), frame=frame)
-        rate = given.rate if given.rate and commands.posture == given.posture else None
-        found = self._watch(contact, rate is not None, dt)
+        rate = given.rate if given.rate and admitted.posture == given.posture else None
+        found = self._watch(contact, rate is not None, dt) if self._run.axes else []
         if given.task is not None and (reason := beyond(given.task, own)):
             found.append(holding(Code.REFUSED, "task", reason=reason))
-        velocity, fed, limits = self._move(found, contact, commands.posture, rate, is_braked, dt)
+        velocity, fed, limits = self._move(found, contact, admitted.posture, rate, is_braked, dt)
         found += limits
-        found += self._watch_motions(found, commands.posture if given.posture is not None else None, rate, dt)
+        found += self._watch_motions(found, admitted.posture if given.posture is not None else None, rate, dt)
         self.events = by_seriousness(self._advised(found, task))
         if self.event.holds:
             self.refusals[topic] = self.event
@@ -290,31 +292,31 @@ class ForceLoop:
         knowledge, sides = self._knowledge, [one.side for one in run.axes]
         links = max(map(len, places))
         each = zip(*(at * (links // len(at)) for at in places), strict=True)
-        axes = zip(*(self._axes.of(self._q, task, at, sides) for at in each), strict=True)
+        axes = zip(*(self._axes.of(self._pose, task, at, sides) for at in each), strict=True)
         for one, axis, at in zip(run.axes, axes, places, strict=True):
-            one.on_links = knowledge.among(self._q, axis[: len(at)], contact)
+            one.on_links = knowledge.among(self._pose, axis[: len(at)], contact)
 
     def _places(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> list[ForcePlace]:
         lean = 0.0
         if axis.joint >= 0:
             return [ForcePlace("", 0.0, 0.0)]
         if contact.cover and axis.position is None:
-            direction = self._axes.rotation(self._q, task.frame).dot(np.array(axis.direction))
-            along = self._axes.forces.link_axis(self._q, contact.cover)
+            direction = self._axes.rotation(self._pose, task.frame).dot(np.array(axis.direction))
+            along = self._axes.forces.link_axis(self._pose, contact.cover)
             lean = abs(float(direction.dot(along)))
         return memory.step(axis, contact, lean, self.parameters)
 
     def _watch(self, contact: Contact, is_led: bool, dt: float) -> list[Event]:
         """What is known of each axis, and what its watch reports."""
         own, run, forces, torques = self.parameters, self._run, self._axes.forces, self._measurement.torques
-        q = np.array(self._q)
+        q = self._pose
         moved = q - (q if run.before is None else run.before)
         run.before = q
-        run.judge(self._q, self._measurement, forces, own.sensing.zero_limit)
+        run.judge(q, self._measurement, forces, own.sensing.zero_limit)
         knowledge = self._knowledge
         for one in run.axes:
-            one.known = knowledge.of(self._q, one.on_links)
-        run.move(moved, forces, self._q)
+            one.known = knowledge.of(q, one.on_links)
+        run.move(moved, forces, q)
         found: list[Event] = []
         if run.is_moving:
             found.append(holding(Code.REFUSED, "moved_fast", speed=FORCE.fast))
@@ -331,7 +333,7 @@ class ForceLoop:
             way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(moved))
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
             found += one.watch.step(axis, Seen(known, way, touched if is_touched else "", is_led), torques.now, own, dt)
-        if run.axes and run.is_touching and not any(event.holds for event in found):
+        if run.is_touching and not any(event.holds for event in found):
             self._pressed_at = q
         if run.free_at is None or not (contact.cover or run.is_touching):
             run.free_at = q
@@ -351,14 +353,12 @@ class ForceLoop:
         dt: float,
     ) -> tuple[Array, list[float], list[Event]]:
         """Joint velocities and torques (n,), and what limits them."""
-        own, run, q = self.parameters, self._run, np.array(self._q)
+        own, run = self.parameters, self._run
         axes = [one.now for one in run.axes]
         holds = any(event.holds for event in found)
         factor = self._supervision.factor(lambda: self._guarded(axes, contact), dt) if axes else 1.0
-        wanted = own.posture_gain * (np.array(posture) + run.approached - q) + (0.0 if rate is None else np.array(rate))
-        wanted = np.minimum(np.maximum(wanted, -own.joint_speed_limit), own.joint_speed_limit)  # np.clip takes longer
         is_watched = bool(axes) and own.is_estimated and not run.is_touching
-        is_watching = is_watched and run.shaking.is_watching(self._q, self._axes.forces, self._servo, dt)
+        is_watching = is_watched and run.shaking.is_watching(self._pose, self._axes.forces, self._servo, dt)
         torque_sd = self._measurement.torques.sd
         if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
             run.still_sd = torque_sd
@@ -367,12 +367,14 @@ class ForceLoop:
         rows: list[VelocityRow] = []
         if holds:
             run.held_at = self._hold_at(found, contact) if run.held_at is None else run.held_at
-            wanted = np.clip(own.posture_gain * (run.held_at - q), -own.joint_speed_limit, own.joint_speed_limit)
             # what it may hit on its way back after a push
-            wanted = calm(wanted, self._axes.forces.moved_inertia(self._q), own.impact_energy(allowed))
+            inertia = self._axes.forces.moved_inertia(self._pose)
+            wanted = calm(self._towards(run.held_at.tolist()), inertia, own.impact_energy(allowed))
         else:
             run.held_at = None
-            rows = self._rows(factor, is_watching, dt)
+            rows = self._rows(factor, is_watching, dt) if axes else []
+            goal = [angle + way for angle, way in zip(posture, run.approached.tolist(), strict=True)]
+            wanted = self._towards(goal, rate)
             if rate is None:
                 wanted = self._slowed(rows, wanted)
         least = self._pushes(forces, contact, holds, allowed, dt)
@@ -388,9 +390,15 @@ class ForceLoop:
         effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces and not holds else fed.tolist()
         return velocity, effort, limits
 
+    def _towards(self, goal: Sequence[float], rate: Sequence[float] | None = None) -> Array:
+        """Velocities (n,), rad/s, towards joint angles (n,), rad, that move at a rate (n,), rad/s."""
+        gain, most = self.parameters.posture_gain, self.parameters.joint_speed_limit
+        each = zip(goal, self._q, rate or [0.0] * len(goal), strict=True)
+        return np.array([min(max(gain * (angle - at) + speed, -most), most) for angle, at, speed in each])
+
     def _hold_at(self, found: Sequence[Event], contact: Contact) -> Array:
         """Where the arm is to hold (n,), rad: here, or off another link, on from where it last was free."""
-        run, q = self._run, np.array(self._q)
+        run, q = self._run, self._pose
         torques = self._measurement.torques.now - run.resting
         is_elsewhere = any(event.holds and event.code is Code.UNEXPLAINED for event in found)
         if not is_elsewhere or run.free_at is None or not torques.any():
@@ -463,7 +471,7 @@ class ForceLoop:
             if axis.is_force and axis.desired and axis.place and one.watch.touch.has_been and own.limits.impact:
                 far, still = [math.inf] * len(wanted), [row._replace(speed=0.0) for row in rows]
                 left = solve(still, wanted, [], [-math.inf] * len(wanted), far).velocity
-                wanted = followed(left, axis, self._body, self._q, own)
+                wanted = followed(left, axis, self._body, self._pose, own)
         return wanted
 
     def _pushes(
@@ -482,12 +490,11 @@ class ForceLoop:
             bounds.append((own.limits.whole_force * pressed, "limits.whole_force"))
         now = torques.now - run.resting
         if torques.acceleration is not None:
-            now = now + self._axes.forces.inertia(self._q).dot(torques.acceleration)
+            now = now + self._axes.forces.inertia(self._pose).dot(torques.acceleration)
         chi2 = max((one.known.chi2 for one in run.axes), default=0.0)
         gain = self._supervision.present * max(own.force_gain)
-        torques = WorldTorques(now, torques.before, torques.acceleration, torques.sd)
         return self._pushed.step(
-            self._q, forces, torques, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt
+            self._pose, forces, now, torques.sd, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt
         )
 
     def _guarded(self, axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
@@ -557,11 +564,11 @@ class ForceLoop:
     def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
         """With what would help a refused force, which is looked for over several periods."""
         run = self._run
-        is_refused = any(event.holds and event.cause == "error" for event in found)
-        places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)] if run.axes else []
-        if not is_refused or task is None or len(run.axes) > 1 or not places:
+        is_one = len(run.axes) == 1 and not run.axes[0].now.is_joint
+        if not is_one or task is None or not any(event.holds and event.cause == "error" for event in found):
             run.search, run.ways = None, {}
             return found
+        places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)]
         run.search = run.search or tries(
             self._q,
             task,
@@ -576,21 +583,22 @@ class ForceLoop:
         return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
 
     def _output(self, velocity: Array, effort: list[float], frame: str, is_task: bool) -> ForceOutput:
-        measured, error, limited = np.zeros(3), np.zeros(3), np.zeros(3)
+        measured = error = limited = ZERO
         each = self._run.axes
-        for axis, known in ((one.now, one.known) for one in each):
+        for one in each:
+            axis, known = one.now, one.known
             if axis.is_force and axis.sensed is not None:
                 law = self._supervision.force_law.along(axis.in_frame.tolist())
                 off = axis.desired - known.force
-                measured += known.force * axis.in_frame
-                error += off * axis.in_frame
-                limited += law.limited(0, off) * axis.in_frame
+                measured = _added(measured, known.force, axis.in_frame)
+                error = _added(error, off, axis.in_frame)
+                limited = _added(limited, law.limited(0, off), axis.in_frame)
         return ForceOutput(
             velocity.tolist(),
             effort,
-            _triple(measured),
-            _triple(error),
-            _triple(limited),
+            measured,
+            error,
+            limited,
             frame,
             tuple(one.now for one in each),
             tuple(one.known for one in each),
@@ -598,12 +606,13 @@ class ForceLoop:
         )
 
 
-def _task(commands: Commands, task: TaskCommand | None, own: ForceLoopParameters) -> tuple[TaskCommand | None, object]:
+def _task(
+    force: ForceCommand | None, task: TaskCommand | None, own: ForceLoopParameters
+) -> tuple[TaskCommand | None, object]:
     """What is commanded as a task, and what makes it the same command as before, whatever its values are."""
     if task is not None:
         kept = (axis._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0) for axis in task.axes)
         return task, (TaskCommand, task.frame, *kept)
-    force = commands.force
     if force is None or not any(force.force):
         return None, None
     size = math.hypot(*force.force)
@@ -621,6 +630,11 @@ def by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
     return tuple(sorted(each.values(), key=lambda event: (not event.holds, event.code.number)))
 
 
+def _added(sum_before: Triple, size: float, direction: Array) -> Triple:
+    (a, b, c), (x, y, z) = sum_before, direction.tolist()
+    return a + size * x, b + size * y, c + size * z
+
+
 def _row(one: AxisRun) -> AxisRow:
     axis, known = one.now, one.known
     commanded = axis.desired if axis.is_force else one.anchor if axis.of.value is None else axis.of.value
@@ -628,8 +642,3 @@ def _row(one: AxisRun) -> AxisRow:
     measured = sign * known.force if axis.of.is_sensed else axis.at
     fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction
     return float(axis.of.kind), commanded, measured, known.sd if axis.of.is_sensed else math.nan, fraction
-
-
-def _triple(values: Array) -> Triple:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -161,14 +161,14 @@ class ForceLoopNode:
             unit = " N" if command and not (torque or task) else ""
             commanded = f"; commanded: {', '.join(map(brief, values))}{unit}" if values else ""
         events = by_seriousness([*events, *refusals.values()])
-        level = Level.WARN if report.is_warning or events else Level.OK
-        facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
         # the numbers of an event change in every period
-        subjects = tuple(event.subject for event in events)
-        present = level, report.message, facts, subjects, self._loop.is_advised, commanded
+        subjects = [event.subject for event in events]
+        present = report, list(refusals), subjects, self._loop.is_advised, commanded
         if present == self._reported:
             return {}
         self._reported = present
+        level = Level.WARN if report.is_warning or events else Level.OK
+        facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
         message = sentences(events) + commanded or report.message
         return {"status": NodeStatus(level, message, facts=facts, events=events)}
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from wam_control.force.force_axis import SensingParameters
 from wam_control.force.force_law import ForceLaw
@@ -187,6 +188,11 @@ class ForceLoopParameters:
         """Whether the estimated torques are fed back, in place of those of sensors."""
         return self.feedback == "contact_estimate"
 
+    @cached_property
+    def sensing_fed_back(self) -> SensingParameters:
+        """How the force is sensed with this feedback."""
+        return self.sensing.of_estimate if self.is_estimated else self.sensing
+
     def impact_energy(self, force: float) -> float:
         """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite if it is 0."""
         own = self.limits
@@ -228,11 +234,6 @@ class ForceLoopParameters:
             "the stiffness, N m/rad, of the known spring that the arm presses, or use 'joint_sensors' or "
             "'contact_estimate'",
         )
-
-
-def sensing_of(parameters: ForceLoopParameters) -> SensingParameters:
-    """How the force is sensed with the feedback of a parameter set."""
-    return parameters.sensing.of_estimate if parameters.is_estimated else parameters.sensing
 
 
 def force_law(parameters: ForceLoopParameters) -> ForceLaw:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.belief import WorldTorques
-from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
+from wam_control.force.force_axis import Angles
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.rigid_body import RigidBody
@@ -22,16 +23,17 @@ class LowPass:
 
     Attributes
     ----------
-    value : filtered values (n,); None before the first input.
+    value : filtered values (n,); empty before the first input.
     """
 
     def __init__(self) -> None:
-        self.value: Array | None = None
+        self.value = list[float]()
 
-    def step(self, value: Array, time_constant: float, dt: float) -> Array:
+    def step(self, value: Sequence[float], time_constant: float, dt: float) -> list[float]:
         """Filtered values; `time_constant` and `dt` in s."""
-        before = value if self.value is None else self.value
-        self.value = before + (value - before) * (dt / (dt + time_constant))
+        share = dt / (dt + time_constant)
+        each = zip(self.value or value, value, strict=True)
+        self.value = [before + (now - before) * share for before, now in each]
         return self.value
 
 
@@ -41,12 +43,12 @@ class Zero(NamedTuple):
     mass: float
     torques: Array
 
-    def at(self, body: RigidBody, q: Sequence[float]) -> Array:
+    def at(self, body: RigidBody, q: Angles) -> Array:
         """Torques of the world on the joints (n,), N m, in a pose (n,), rad."""
         return self.torques + self.mass * _weight(body, q) if self.mass else self.torques
 
 
-def _weight(body: RigidBody, q: Sequence[float]) -> Array:
+def _weight(body: RigidBody, q: Angles) -> Array:
     """Torques of the world on the joints (n,), N m, by a mass of 1 kg at the tool."""
     weight: Array = np.array(body.arm.gravity) @ body.tool_jacobian(q)
     return weight
@@ -70,14 +72,14 @@ class ForceMeasurement:
         self.free = self._external = self._none
         self._q: Sequence[float] = ()
         self._torque_sd = self._none
-        self._velocity: Array | None = None
-        self._filters = {"torque": LowPass(), "steady": LowPass(), "acceleration": LowPass(), "speed": LowPass()}
+        self._velocity = list[float]()
+        self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
         self.rested, self.speed = 0.0, math.inf
         self.restart()
 
     def restart(self) -> None:
         """Forget the filtered torques."""
-        self._filters["torque"] = LowPass()
+        self._filter = LowPass()
         self.torques = WorldTorques(self._none, self._none, None, self._none)
 
     def step(
@@ -103,24 +105,23 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(own, sensors, estimated)
-        self._q, self._torque_sd = joints.position, self._none + sensing_of(own).torque_sd
-        speeds = self._filters["speed"].step(np.array(joints.velocity), FORCE.steady_time, dt)
-        self.speed = max(map(abs, speeds.tolist()))
+        self._q, self._torque_sd = joints.position, self._none + own.sensing_fed_back.torque_sd
+        self.speed = max(map(abs, self._speed.step(joints.velocity, FORCE.steady_time, dt)))
         self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
-        self._filters["steady"].step(torque, FORCE.steady_time, dt)
+        self._steady.step(torque.tolist(), FORCE.steady_time, dt)
         self._external = torque - self._zeros
         counted = self._external if is_touched or not own.is_estimated else self._none
-        before = self._filters["torque"].value
-        now = self._filters["torque"].step(counted, own.force_filter, dt)
+        is_first = not self._filter.value
+        now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
         sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._torque_sd
-        self.torques = WorldTorques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
+        self.torques = WorldTorques(now, now if is_first else self.torques.now, self._accelerated(own, sensors, dt), sd)
 
-    def _acceleration(self, own: ForceLoopParameters, sensors: State | None, dt: float) -> Array | None:
-        velocity = self._none if sensors is None else np.array(sensors.velocity)
-        change = velocity - (velocity if self._velocity is None else self._velocity)
+    def _accelerated(self, own: ForceLoopParameters, sensors: State | None, dt: float) -> Array | None:
+        velocity = [0.0] * len(self._none) if sensors is None else sensors.velocity
+        change = [(now - before) / dt for now, before in zip(velocity, self._velocity or velocity, strict=True)]
         self._velocity = velocity
-        filtered = self._filters["acceleration"].step(change / dt, own.force_filter, dt)
-        return filtered if own.feedback == "joint_sensors" else None
+        filtered = self._acceleration.step(change, own.force_filter, dt)
+        return np.array(filtered) if own.feedback == "joint_sensors" else None
 
     def _torque(self, own: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None) -> Array:
         if own.is_estimated:
@@ -153,23 +154,17 @@ class ForceMeasurement:
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
-        steady = self._filters["steady"].value
-        return self._external if steady is None else steady - self._zeros
+        return np.array(self._steady.value) - self._zeros
 
-    def zero(self, limit: float) -> bool:
-        """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
-        steady = self._filters["steady"].value
-        if steady is None:
-            return False
-        found = steady - self._tare.at(self._body, self._q)
-        if float(np.abs(found).max()) > limit:
-            return False
-        self._zero = self._taken(found)
-        self.free = self._zeros
-        self.restart()
-        return True
+    def zero(self, limit: float) -> None:
+        """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m."""
+        found = np.array(self._steady.value) - self._tare.at(self._body, self._q)
+        if float(np.abs(found).max()) <= limit:
+            self._zero = self._taken(found)
+            self.free = self._zeros
+            self.restart()
 
-    def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
+    def payload(self, q: Angles, torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
 
         Parameters

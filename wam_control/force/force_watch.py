@@ -36,6 +36,8 @@ class Lasting:
 
     def step(self, is_there: bool, after: float, back: float, dt: float) -> bool:
         """One period of dt, s; it begins `after` s with the condition, and ends `back` s without it."""
+        if not (is_there or self._level):  # as most are for most of the time
+            return False
         change = dt / max(after, dt) if is_there else -dt / max(back, dt)
         self._level = min(max(self._level + change, 0.0), 1.0)
         self.is_on = self._level > 1.0 - FORCE.rounding or (self.is_on and self._level > FORCE.rounding)

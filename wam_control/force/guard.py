@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from wam_control.force.belief import tolerance
-from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
+from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of, torque_law
 from wam_control.force.stability_guard import (
     GuardAssessment,
     Guarded,
@@ -68,7 +68,7 @@ class Supervision:
         self.servo_stiffness = TransmissionMap.of(arm).at_joints(servo.integral_gain)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
-        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, sensing_of(parameters))
+        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, parameters.sensing_fed_back)
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
         self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, arm.joints.names)

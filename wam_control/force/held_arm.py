@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.belief import WorldTorques
+from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import WorldPush, certain_size, likeliest_link
 from wam_control.force.problem import VelocityRow
@@ -50,9 +50,10 @@ class PushedArm:
 
     def step(
         self,
-        q: Sequence[float],
+        q: Angles,
         axes: Sequence[CommandedAxis],
-        torques: WorldTorques,
+        torques: Array,
+        torque_sd: Array,
         contact: Contact,
         chi2: float,
         bound: tuple[float, str],
@@ -68,7 +69,7 @@ class PushedArm:
         ----------
         q : joint angles (n,), rad.
         axes : of the commanded forces of points.
-        torques : of the world on the joints, of the arm's own motion free.
+        torques, torque_sd : of the world on the joints (n,), N m, free of the arm's own motion, and of each its sd.
         contact : estimated.
         chi2 : of the torques that the commanded forces do not explain.
         bound : force, N, up to which nothing gives way, and what sets it.
@@ -80,12 +81,12 @@ class PushedArm:
         """
         self._since += dt
         is_new = self._since > own.limits.settling_time
-        certain = certain_size(torques.now, torques.sd)
+        certain = certain_size(torques, torque_sd)
         jacobians = [self._jacobian(q, axes, contact)] if certain else []
         if certain and chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
-            jacobians.append(likeliest_link(self._body, q, torques.now))
-        pushes = [WorldPush.at(torques.now, certain, jacobian) for jacobian in jacobians]
-        hardest = max((push.least for push in pushes), default=0.0)
+            jacobians.append(likeliest_link(self._body, q, torques))
+        pushes = [WorldPush.at(torques, certain, jacobian) for jacobian in jacobians]
+        hardest = max([push.least for push in pushes], default=0.0)
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
         allowed = max(bound[0], self._allowed * (1.0 - fade))
@@ -106,7 +107,7 @@ class PushedArm:
             return []
         return [push.row(allowed, gain, own.joint_speed_limit) for push in pushes]
 
-    def _jacobian(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> Array:
+    def _jacobian(self, q: Angles, axes: Sequence[CommandedAxis], contact: Contact) -> Array:
         """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""
         places = {axis.place[:2] for axis in axes if axis.place and axis.place.is_known}
         if len(places) == 1:

@@ -9,8 +9,8 @@ from wam_control.force.axes import CommandedAxis, Links
 from wam_control.force.belief import Belief, WorldTorques, belief
 from wam_control.force.command_run import CommandRun
 from wam_control.force.contact_place import STEEPEST
-from wam_control.force.force_axis import ForceAxes
-from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
+from wam_control.force.force_axis import Angles, ForceAxes
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_description.signals import Contact
 
@@ -29,7 +29,7 @@ class Knowledge:
     def __init__(self, run: CommandRun, torques: WorldTorques, forces: ForceAxes, own: ForceLoopParameters) -> None:
         self._run, self._torques, self._forces, self._own = run, torques, forces, own
 
-    def among(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> Links:
+    def among(self, q: Angles, axes: Sequence[CommandedAxis], contact: Contact) -> Links:
         """The same axis on each link that may be touched, with the probability of that, the largest first.
 
         It is that of any contact there, less where no force that presses as commanded explains the torques.
@@ -48,7 +48,7 @@ class Knowledge:
         chances = np.exp(np.array(logs) - max(logs))
         return sorted(zip((chances / chances.sum()).tolist(), able, strict=True), key=lambda one: -one[0])
 
-    def of(self, q: Sequence[float], on_links: Links) -> Belief:
+    def of(self, q: Angles, on_links: Links) -> Belief:
         """What is known of a force in a pose (n,), rad: on one of several links, its variance is that of a mixture."""
         (probability, axis), *others = on_links
         known = self._whole(q, axis)
@@ -60,7 +60,7 @@ class Knowledge:
             variance += chance * (there.sd**2 + probability * apart**2)
         return known._replace(errors=known.errors._replace(place=math.sqrt(variance)))
 
-    def _whole(self, q: Sequence[float], axis: CommandedAxis) -> Belief:
+    def _whole(self, q: Angles, axis: CommandedAxis) -> Belief:
         """What is known of a force, with the errors that the whole commanded force will have."""
         known, place = self._as_placed(axis), axis.place
         if place is None or place.is_pinned or known.force >= axis.desired or place.is_touched:
@@ -80,6 +80,6 @@ class Knowledge:
             size = math.hypot(*(one.now.desired for one in run.axes if one.now.is_joint))
         if own.is_estimated and axis.sensed is not None and not run.is_touching:
             # it will press at rest: on the way there, the friction of the moving motors is less certain
-            pressed = sensing_of(own).torque_fraction * axis.desired * axis.sensed.press
+            pressed = own.sensing_fed_back.torque_fraction * axis.desired * axis.sensed.press
             torques = torques._replace(sd=np.hypot(run.still_sd, pressed))
         return belief(axis, size, torques, own, run.is_touching, run.resting, run.shaking.swing(axis, own))

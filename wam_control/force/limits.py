@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.force_axis import ForceAxis
+from wam_control.force.force_axis import Angles, ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
@@ -27,9 +27,10 @@ def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -
         return [-speed] * len(q), [speed] * len(q)
 
     def towards(distance: float) -> float:
-        if distance < 0.0:
-            return max(gain * distance, -FORCE.push_back)
-        return min(gain * max(distance - margin, 0.0), speed)
+        fastest = gain * (distance - margin)
+        if fastest >= speed:  # as most joints are: far from their ends
+            return speed
+        return max(fastest, 0.0) if distance >= 0.0 else max(gain * distance, -FORCE.push_back)
 
     low = [-towards(at - lower) for lower, at in zip(joints.lower, q, strict=True)]
     return low, [towards(upper - at) for upper, at in zip(joints.upper, q, strict=True)]
@@ -38,7 +39,11 @@ def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -
 def accelerated(low: Sequence[float], high: Sequence[float], before: Sequence[float], step: float) -> Bounds:
     """Bounds (n,), rad/s, within a step of the velocities before (n,), rad/s; those of the speed come first."""
     each = list(zip(low, high, before, strict=True))
-    return [min(max(a, v - step), b) for a, b, v in each], [max(min(b, v + step), a) for a, b, v in each]
+    return [_within(v - step, a, b) for a, b, v in each], [_within(v + step, a, b) for a, b, v in each]
+
+
+def _within(value: float, low: float, high: float) -> float:
+    return low if value < low else min(value, high)
 
 
 def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
@@ -150,7 +155,7 @@ class WorldPush(NamedTuple):
         return VelocityRow(along, min(gain * (self.least - allowed) / self.lever, fastest))
 
 
-def likeliest_link(body: RigidBody, q: Sequence[float], torques: Array) -> Array:
+def likeliest_link(body: RigidBody, q: Angles, torques: Array) -> Array:
     """Jacobian (3, n) of the far end of the link of which one force explains torques (n,), N m, best.
 
     Elsewhere on this link, a force needs to be larger for the same torques.
@@ -171,9 +176,7 @@ def calm(velocity: Array, inertia: Array, energy: float) -> Array:
     return velocity * math.sqrt(energy / moving) if moving > energy else velocity
 
 
-def followed(
-    posture: Array, axis: CommandedAxis, body: RigidBody, q: Sequence[float], own: ForceLoopParameters
-) -> Array:
+def followed(posture: Array, axis: CommandedAxis, body: RigidBody, q: Angles, own: ForceLoopParameters) -> Array:
     """Velocities of a posture (n,), rad/s, at which the link slides no faster than the force law follows a slope.
 
     The law follows with its gain once the change is measured; until then the surface yields.

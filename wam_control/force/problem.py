@@ -82,6 +82,8 @@ def _limited(
     rows: Sequence[VelocityRow], posture: Array, least: Sequence[VelocityRow], low: Array, high: Array
 ) -> Array:
     """The same with limits: each one-sided row has a slack of its own."""
+    if not rows and not least:  # no joint depends on another
+        return np.clip(posture, low, high)
     n, m = len(posture), len(least)
     matrix, right = _normal(rows, posture)
     quadratic = RANK * np.eye(n + m)
