@@ -158,6 +158,8 @@ class ArmDriver(StackNode):
         """Brake an enabled arm for a problem; a braked one is not enabled while there is one."""
         if problem and self.safety.mode is Mode.ENABLED:
             self.trip(problem)
+        elif problem:
+            self.safety.restate(problem)
         self.announce()
 
     def take_status(self, status: NodeStatus) -> None:
@@ -173,7 +175,11 @@ class ArmDriver(StackNode):
         if status.level is Level.ERROR and status.fault:
             found = [one.values["topic"] for one in status.events if one.code is Code.FAULT and "topic" in one.values]
             late = f"; {self.lateness}" if self.lateness else ""
-            self.trip(fault("node", node=status.node, fault=status.fault, late=late, topic=next(iter(found), "")))
+            event = fault("node", node=status.node, fault=status.fault, late=late, topic=next(iter(found), ""))
+            stated = {one.subject: one.values.get("fault") for one in self.safety.events}
+            if found and stated.get(event.subject) != status.fault:
+                self.safety.restate(event)
+            self.trip(event)
 
     def _forget_nodes(self) -> None:
         """Drop the problem of a node that has ended, or never was, as its status was replayed."""

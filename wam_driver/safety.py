@@ -68,6 +68,10 @@ class Safety:
             self.mode, self.events = Mode.FAULT, (event,)
         self._brake()
 
+    def restate(self, event: Event) -> None:
+        """Replace a latched fault by the same one with what is known by now, as the names of nodes."""
+        self.events = tuple(event if one.subject == event.subject else one for one in self.events)
+
     def estop(self) -> Answer:
         """Stop at once and latch a fault."""
         self.trip(fault("emergency_stop"))

@@ -38,11 +38,13 @@ def test_request_leads_where_it_should(mode: Mode, request_name: str, after: Mod
     assert answer.message.startswith("refused" if not success else after.value)
 
 
-def test_first_fault_is_kept_until_reset() -> None:
-    safety = in_mode(Mode.FAULT)
+def test_first_fault_is_kept_until_reset_and_restated_as_more_is_known() -> None:
+    safety, named = in_mode(Mode.FAULT), fault("test", reason="first", nodes="both")
     safety.trip(fault("test", reason="second"))
     safety.disable()
-    assert safety.fault == "first"
+    for one in (fault("test", reason="second"), named):
+        safety.restate(one)
+    assert safety.events == (named,)
     safety.reset_fault()
     assert not safety.fault
     safety.trip(fault("test", reason="third"))
