@@ -36,7 +36,7 @@ EXCESS: Final = "{quantity} is {value:b} {unit}, above its limit of {allowed:g} 
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": (
         "the uncertain torques",
-        "use joint sensors, or the dither if it is off (timing.dither_cycle=40)",
+        "use joint sensors, or the dither (timing.dither_cycle=40)",
     ),
     "friction": (
         "the unknown friction of the surface",
@@ -58,6 +58,7 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     ),
 }
 INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
+    ("torques", "dithered motors"): "use joint sensors",
     ("torques", "sensors"): "raise limits.tolerance, or command fewer forces at once",
     ("place", "pinned"): "bend the arm, or lower contact_position_sd if the position is known better",
 }
@@ -124,8 +125,8 @@ SENTENCES: Final = {  # by cause
     "move in this direction here",
     "speed": RAISE,
     "torques_differ": "the torques do not fit a force at {position:.3g} m along {cover} (chi^2 {chi2:.3g}, allowed: "
-    "{allowed:g}); perhaps it acts elsewhere, a second force acts, or friction of motors at rest hides a part of it; "
-    "correct the contact position, use the dither, or free the arm",
+    "{allowed:g}); perhaps it acts elsewhere{hidden}, or a second force acts; correct the contact position{dither}, or "
+    "free the arm",
     "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}); "
     "perhaps a second force acts, or the friction of the surface has changed its direction; command the force again",
     "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N ({limit}); the arm "
@@ -134,7 +135,8 @@ SENTENCES: Final = {  # by cause
     "posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N peak to peak, with a period of {period:b} s; "
     "allowed: {allowed:g} times the commanded {desired:.3g} N (limits.cycle_force); {calm}",
-    "model_off": "the {part} differs from the configured one; /diagnostics has the difference; if it lasts, {model}",
+    "model_off": "the {part} seems to differ from the configured one; /diagnostics has the difference; if it lasts, "
+    "{model}",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old; allowed: {allowed_ms:.0f} ms; {cure}",
@@ -156,6 +158,11 @@ SENTENCES: Final = {  # by cause
     **{f"bus_{cause}": f"bus: {text}" for cause, text in BUS.items()},
 }
 LESS: Final = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
+LOADED: Final = "declare the load (arm.payload); if the tool carries none, "  # else the model is wrong
+TURNED: Final = "a force in the frame of a link turns with it"
+HIDDEN: Final = {  # by what measures the force: what else may explain the torques, and what to do about it
+    "motors": (", friction of motors at rest hides a part of it", ", use the dither (timing.dither_cycle=40)")
+}
 SINCE: Final = ("without a contact", "since the force was last within its tolerance")
 REACH: Final = (
     "nothing is touched; bring the arm to the surface first, command more force, or bend the arm",
@@ -205,11 +212,11 @@ def sentences(events: Iterable[Event]) -> str:
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     """What the placeholders of a sentence stand for that are no values."""
-    has_touched, is_motors = values.get("has_touched", 0.0) > 0.0, values.get("source") == "motors"
+    has_touched, is_motors = values.get("has_touched", 0.0) > 0.0, "motors" in str(values.get("source", ""))
     push, ago = values.get("push"), values.get("ago", 0.0)
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
     is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
-    way = values.get("way", 0.0)
+    way, source = values.get("way", 0.0), values.get("source", "")
     found = {
         "travel": f"{abs(way):.3g} m {'against' if way < 0.0 else 'along'}",
         "since": SINCE[has_touched],
@@ -217,7 +224,8 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
         "calm": CALM[is_motors],
         "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,
         "lamps": f" (the pendant shows a fault of the {values['detail']})" if values.get("detail") else "",
-        "model": "declare it (arm.payload)" if values.get("part") == "payload" else "run 'wam identify'",
+        **dict(zip(("hidden", "dither"), HIDDEN.get(str(source), ("", "")), strict=True)),
+        "model": LOADED * (values.get("part") == "payload") + "run 'wam identify'",
     }
     if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
@@ -232,7 +240,7 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
     """What to do in place of a refused force: what was found, and what helps against its largest part."""
     found = []
     if "turn" in values:
-        found.append(f"turn {values['turn']} from {values['turn_from']:.2f} to {values['turn_to']:.1f} rad")
+        found.append(f"turn {values['turn']} from {values['turn_from']:.2f} to {values['turn_to']:.1f} rad ({TURNED})")
     if "more_force" in values:
         found.append(f"command {values['more_force']:g} N")
     if "pin" in values and helps is not PINNED:

@@ -30,7 +30,7 @@ class Pressed:
     """A watched force, measured as it is said."""
 
     def __init__(self, axis: CommandedAxis = AXIS, **limits: float) -> None:
-        self.axis, self.watch = axis, ForceWatch()
+        self.axis, self.watch = axis, ForceWatch(False)
         self.own = replace(OWN, limits=replace(OWN.limits, **limits))
 
     def go(

@@ -15,6 +15,7 @@ from wam_sim.recorded_run import RecordedStep
 SECOND = 1_000_000_000
 PUSH = {"allowed": 20.0, "limit": "limits.whole_force"}
 OFF = {"axis": "press", "desired": 5.0, "unit": "N", "time": 2.0, "allowed": 0.5, "has_touched": 0.0}
+DIFFER = {"position": 0.2, "cover": "outer_link", "chi2": 20.0, "allowed": 9.0}
 
 
 def named(code: Code, joint: str) -> Event:
@@ -49,7 +50,9 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
             "-5.6 N have been measured for 2 s; the arm is p",
         ),
         (warning(Code.MODEL_OFF, "model_off", part="friction of motor1"), "if it lasts, run 'wam identify'"),
-        (warning(Code.MODEL_OFF, "model_off", part="payload"), "if it lasts, declare it (arm.payload)"),
+        (warning(Code.MODEL_OFF, "model_off", part="payload"), "(arm.payload); if the tool carries none, run"),
+        (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="motors"), "position, use the dither (t"),
+        (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="sensors"), "position, or free the arm"),
     ],
 )
 def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: str) -> None:

@@ -31,6 +31,7 @@ class AxisRun:
     ----------
     of : what is commanded.
     covers : of the arm.
+    is_dithered : whether the motors have a dither.
 
     Attributes
     ----------
@@ -47,11 +48,11 @@ class AxisRun:
     is_kept : whether its force is left as it is.
     """
 
-    def __init__(self, of: TaskAxis, covers: Covers) -> None:
+    def __init__(self, of: TaskAxis, covers: Covers, is_dithered: bool) -> None:
         self.on_links: Links
         self.known = UNKNOWN
         self.place = ContactPlace(covers)
-        self.watch, self.motion = ForceWatch(), MotionWatch()
+        self.watch, self.motion = ForceWatch(is_dithered), MotionWatch()
         self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
         self.rising = self._shown = 0.0
         self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
@@ -178,7 +179,7 @@ class CommandRun:
         is_moving: bool,
     ) -> None:
         self.key, self.frame = key, task.frame if task else ""
-        self.axes = [AxisRun(axis, arm.covers) for axis in (task.axes if task else ())]
+        self.axes = [AxisRun(axis, arm.covers, timing.dither_cycle > 0) for axis in (task.axes if task else ())]
         self.held_at: Array | None = None
         self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()
         self.approached = np.zeros_like(resting)

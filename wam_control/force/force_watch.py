@@ -154,6 +154,10 @@ class Seen(NamedTuple):
 class ForceWatch:
     """The events of one force axis.
 
+    Parameters
+    ----------
+    is_dithered : whether the motors have a dither.
+
     Attributes
     ----------
     touch : of what is pressed.
@@ -161,7 +165,8 @@ class ForceWatch:
     ended : the event because of which the arm holds until the command ends; None where there is none.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_dithered: bool) -> None:
+        self._is_dithered = is_dithered
         self.touch, self.oscillation = TouchWatch(), Oscillation()
         self.ended: Event | None = None
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
@@ -203,7 +208,7 @@ class ForceWatch:
             events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
         # a force that rises too far is only crossed
         self._has_settled = self._right.step(is_reached, soon, dt, dt) or self._has_settled
-        events += self._unexplained(axis, known, torques, lasting, dt)
+        events += self._unexplained(axis, known, torques, own, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
             sd = own.sensing.torque_sd
             sd = axis.sensed.error(sd) if axis.sensed else sd
@@ -221,7 +226,7 @@ class ForceWatch:
             self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
         is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
         self._is_decided = self._is_decided or (is_there and not self._is_refused)
-        part, source = known.errors.cause, _source(own)
+        part, source = known.errors.cause, _source(own, self._is_dithered)
         if part == "place" and place is not None:
             source = "pinned" if place.is_pinned else "estimated"
         values: dict[str, Value] = {
@@ -261,15 +266,18 @@ class ForceWatch:
         )
 
     def _unexplained(
-        self, axis: CommandedAxis, known: Belief, torques: Array, lasting: float, dt: float
+        self, axis: CommandedAxis, known: Belief, torques: Array, own: ForceLoopParameters, dt: float
     ) -> list[Event]:
         """The torques are not those of the force, or no longer those with which it has settled."""
         if axis.sensed is None or axis.place is None or known.sd == math.inf:
             return []
         where: dict[str, Value] = {"cover": axis.place.cover, "position": axis.place.position}
         is_strange = known.chi2 > FORCE.unexplained and self.touch.is_there
+        lasting = own.limits.settling_time
         if self._strange.step(is_strange, lasting, lasting, dt):
-            return [warning(Code.UNEXPLAINED, "torques_differ", **where, chi2=known.chi2, allowed=FORCE.unexplained)]
+            source = _source(own, self._is_dithered)
+            given: dict[str, Value] = {"chi2": known.chi2, "allowed": FORCE.unexplained, "source": source}
+            return [warning(Code.UNEXPLAINED, "torques_differ", **where, **given)]
         if self._right.is_on and self._pattern is None:
             # with the pose the torques of the force change, too; what is estimated moves with whatever else pushes
             self._pattern = torques / known.force + axis.sensed.press * axis.place.is_pinned
@@ -332,9 +340,9 @@ class MotionWatch:
         )
 
 
-def _source(own: ForceLoopParameters) -> str:
+def _source(own: ForceLoopParameters, is_dithered: bool = False) -> str:
     """What measures the force."""
-    return "motors" if own.is_estimated else "sensors"
+    return ("dithered motors" if is_dithered else "motors") if own.is_estimated else "sensors"
 
 
 def _unit(axis: CommandedAxis) -> str:
