@@ -237,6 +237,9 @@ def test_each_contact_is_compared_with_the_true_one():
     assert (outer.latency, inner.latency, press.latency) == pytest.approx((0.025, 0.005, 0.035))
     assert (inner.true, held.step, lifted.step) == ("inner_link", "press 4 N", "lift")
     assert all(map(math.isnan, (inner.force_error, held.latency, lifted.latency)))  # a lower bound has no error
+    recording = Played()
+    recording.set(recording.estimated, 7.5, 9.0, "outer_link", (0.0, 3.0, 0.0))
+    assert "estimated force [N] 7.84 >=3 error of the estimated force [%] -2 - " in told(recording.bag())
 
 
 @pytest.mark.parametrize(

@@ -143,9 +143,11 @@ def press_findings(one: HeldForce) -> list[Finding]:
     if one.hold.is_refused:
         return found
     for whose, accuracy in one.accuracy.items():
-        error = 100.0 * accuracy.bias / one.hold.commanded
+        is_bound = whose == "estimated" and one.is_lower_bound
+        force = one.hold.commanded + accuracy.bias
+        error = math.nan if is_bound else 100.0 * accuracy.bias / one.hold.commanded
         found += [
-            Finding(f"{name}: {whose} force", "N", one.hold.commanded + accuracy.bias, note=STEADY_PART),
+            Finding(f"{name}: {whose} force", "N", force, note=STEADY_PART, is_lower_bound=is_bound),
             Finding(f"{name}: error of the {whose} force", "%", error),
             Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
         ]

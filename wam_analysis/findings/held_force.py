@@ -24,7 +24,7 @@ from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.recorded import PredictionParameters
-from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
+from wam_analysis.thresholds import CYCLE, HOLD, SHAFT, TOUCH
 from wam_analysis.traces import Traces
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import JointColumns
@@ -80,6 +80,7 @@ class HeldForce(NamedTuple):
     cover, position : of the contact, by the simulator, else estimated, else as configured in the force loop; m.
     swinging : of the force, of a motor or joint where neither the measured nor the true one was recorded; None without.
     is_pushed : whether the scenario pushed the arm meanwhile.
+    is_lower_bound : whether the estimated force is one in the steady part.
     """
 
     hold: Hold
@@ -96,6 +97,7 @@ class HeldForce(NamedTuple):
     position: float = math.nan
     swinging: Swinging | None = None
     is_pushed: bool = False
+    is_lower_bound: bool = False
 
     @property
     def best(self) -> ForceAccuracy:
@@ -129,6 +131,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     steady, late = ((1.0 - part) * duration for part in (HOLD.steady, CYCLE.late_part))
+    bound = traces.estimated.is_lower_bound[rows][signals["estimated"][0] >= steady]
     accuracy = {name: _accuracy(force[at >= steady] - hold.commanded) for name, (at, force) in signals.items()}
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
@@ -139,6 +142,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
         before=_before(traces, hold, measured),
         accuracy=UNMEASURED if hold.is_short else accuracy,  # a short one has no steady part
         cycle=next(filter(None, cycles), NO_CYCLE),
+        is_lower_bound=float(np.sum(bound)) > TOUCH.lasting * len(bound),
         swinging=_swinging(run, hold, *((time, measured) if len(measured) else (time_true, true))),
     )
 
