@@ -28,8 +28,7 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Gram = list[list[float]]
-Torques = Sequence[tuple[int, float]]  # a sum of columns of Z: index and factor of each
-TWIST, AXIAL = 5, 6  # among these columns
+TWIST, AXIAL = 5, 6  # among the columns of Z
 # a piece of a link: log of the probability density of a contact, per metre; position and width, m; link; whether it is
 # that of a force along the tube
 Piece = tuple[float, float, float, int, bool]
@@ -69,30 +68,21 @@ class Fit(NamedTuple):
     residual: float
 
 
-def widened(gram: Gram, one: Torques, two: Torques, kept: slice) -> tuple[Gram, float]:
+def widened(gram: Gram, u: list[float], v: list[float], w11: float, w12: float, w22: float) -> tuple[Gram, float]:
     """Gram matrix, and log |S'| / |S|, if two torques of unit variance are in the covariance, too.
 
-    Of the Gram matrix only the rows and columns `kept` are computed.
+    Parameters
+    ----------
+    u, v : inner products of these torques with the columns of Z that are wanted, which are the first ones of `gram`.
+    w11, w12, w22 : elements of 1 + V, of their own inner products.
     """
-    u, v = _products(gram, one), _products(gram, two)
-    w11, w12 = 1.0 + sum([part * u[i] for i, part in one]), sum([part * u[i] for i, part in two])
-    w22 = 1.0 + sum([part * v[i] for i, part in two])
     determinant = max(w11 * w22 - w12 * w12, w11 + w22 - 1.0)  # at least this, but for rounding
-    u, v, w11, w12, w22 = u[kept], v[kept], w11 / determinant, w12 / determinant, w22 / determinant
+    w11, w12, w22 = w11 / determinant, w12 / determinant, w22 / determinant
     found = []
-    for row, a, b in zip(gram[kept], u, v):  # noqa: B905
+    for row, a, b in zip(gram, u, v):  # noqa: B905
         p, q = w22 * a - w12 * b, w11 * b - w12 * a
-        found.append([g - p * x - q * y for g, x, y in zip(row[kept], u, v)])  # noqa: B905
+        found.append([g - p * x - q * y for g, x, y in zip(row, u, v)])  # noqa: B905
     return found, math.log(determinant)
-
-
-def _products(gram: Gram, torques: Torques) -> list[float]:
-    """Inner products of torques with all columns of Z."""
-    (i, part), *more = torques
-    found = [part * g for g in gram[i]]
-    for i, part in more:
-        found = [a + part * g for a, g in zip(found, gram[i])]  # noqa: B905
-    return found
 
 
 def log_evidence(rr: float, ra: float, aa: float, scale: float) -> float:
@@ -137,18 +127,18 @@ class _Link(NamedTuple):
         terms = (*n11, *n12, a2[2] + precision, 2.0 * a2[4], b2[4], r[1], r[3], 0.0, r[2], r[4], 0.0)
         return cls(gram, precision, math.log(precision) - 0.5 * (r[0] + volume), terms)
 
-    def force(self, x: float) -> tuple[Pair, float, Triple]:
-        """Most likely force at position x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
+    def force(self, x: float) -> tuple[float, Pair, Triple]:
+        """Of the most likely force at position x: the part of r^T W r it explains, it, its covariance 11, 12, 22."""
         p0, p1, p2, q0, q1, q2, s0, s1, s2, c0, c1, _, e0, e1, _ = self.terms
         n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
         torque1, torque2 = c0 + x * c1, e0 + x * e1
         determinant = n11 * n22 - n12 * n12
         f1, f2 = (n22 * torque1 - n12 * torque2) / determinant, (n11 * torque2 - n12 * torque1) / determinant
-        return (f1, f2), f1 * torque1 + f2 * torque2, (n22 / determinant, -n12 / determinant, n11 / determinant)
+        return f1 * torque1 + f2 * torque2, (f1, f2), (n22 / determinant, -n12 / determinant, n11 / determinant)
 
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link."""
-        _, explained, (s11, s12, s22) = self.force(x)
+        explained, _, (s11, s12, s22) = self.force(x)
         return 0.5 * (explained + math.log(s11 * s22 - s12 * s12))
 
     def torque_position_sd(self, x: float, force: Pair) -> float:
@@ -216,9 +206,9 @@ class ContactFit:
         for i, (link, values) in enumerate(zip(links, self._log_density(links), strict=True)):
             pieces += self._grid(i, link, values)
             pieces += self._at_ends(i, link)
-        floor = max(pieces)[0] - CONTACT.search_depth
-        pieces = [piece for piece in pieces if piece[0] > floor]
         pieces.sort(reverse=True)
+        floor = pieces[0][0] - CONTACT.search_depth
+        pieces = [piece for piece in pieces if piece[0] > floor]
         parts, total = self._parts(pieces)
         total += math.exp(min(other - pieces[0][0], CONTACT.largest_exponent))
         each = zip(links, parts, self._ends, strict=True)
@@ -234,12 +224,20 @@ class ContactFit:
         precision = given.force_scale**-2
         link = _Link.of(gram, precision, 0.0)
         found = [link.force(start + (end - start) * part) for part in (1 / 6, 1 / 2, 5 / 6)]
-        largest = max([(explained, math.hypot(*force)) for force, explained, _ in found])[1]
-        _, (f1, f2) = max([(each + math.log(s[0] * s[2] - s[1] * s[1]), force) for force, each, s in found])
+        largest = math.hypot(*max(found)[1])
+        _, (f1, f2) = max([(each + math.log(s[0] * s[2] - s[1] * s[1]), force) for each, force, s in found])
         size, turn = math.hypot(f1, f2) + CONTACT.smallest_force, given.friction * radius
-        twist = [(TWIST, given.moment_arm_offset * radius * size)]
-        axial = [(AXIAL, given.friction * size), (3, turn * f1), (4, turn * f2)]
-        wide, volume = widened(gram, twist, axial, slice(5))
+        twist, axial, turn1, turn2 = (
+            given.moment_arm_offset * radius * size,
+            given.friction * size,
+            turn * f1,
+            turn * f2,
+        )
+        u = [twist * g for g in gram[TWIST]]
+        v = [axial * g + turn1 * a + turn2 * b for g, a, b in zip(gram[AXIAL], gram[3], gram[4])]  # noqa: B905
+        w12 = axial * u[AXIAL] + turn1 * u[3] + turn2 * u[4]
+        w22 = 1.0 + (axial * v[AXIAL] + turn1 * v[3] + turn2 * v[4])
+        wide, volume = widened(gram, u[:5], v[:5], 1.0 + twist * u[TWIST], w12, w22)
         precision = min(precision, 1.0 / (largest * largest + CONTACT.smallest_force))
         return _Link.of(wide, precision, volume + 2.0 * self._log_rarity(largest))
 
@@ -292,15 +290,17 @@ class ContactFit:
             return [], math.inf
         size = abs(gram[0][AXIAL]) / (gram[AXIAL][AXIAL] + scale**-2) + CONTACT.smallest_force
         arm, length, rarity = math.sqrt(0.5) * self._radius[i] * size, end - start, self._log_rarity(size)
-        found, left = list[Piece](), math.inf
-        pieces = [([(3, arm)], [(4, arm)], start + 0.5 * length, length, 1)]
-        for slope in CONTACT.end_slopes:
-            lean, far = slope * size, slope * size * end
-            pieces.append(
-                ([(1, lean), (3, far)], [(2, lean), (4, far)], end, CONTACT.end_length, len(CONTACT.end_slopes))
-            )
-        for one, two, x, width, count in pieces:
-            ((rr, ra), (_, aa)), volume = widened(gram, one, two, slice(0, None, AXIAL))
+        r, a1, a2, b1, b2, _, axial = gram
+        inner = [[r[0], r[AXIAL]], [r[AXIAL], axial[AXIAL]]]
+        found, left, slopes = list[Piece](), math.inf, CONTACT.end_slopes
+        # a force across: at the start, times the moment arm about it; position, width and share of the weight
+        pieces = [(0.0, arm, start + 0.5 * length, length, 1)]
+        pieces += [(slope * size, slope * size * end, end, CONTACT.end_length, len(slopes)) for slope in slopes]
+        for lean, far, x, width, count in pieces:
+            u = [lean * a + far * b for a, b in zip(a1, b1)]  # noqa: B905
+            v = [lean * a + far * b for a, b in zip(a2, b2)]  # noqa: B905
+            w11, w12, w22 = 1.0 + (lean * u[1] + far * u[3]), lean * u[2] + far * u[4], 1.0 + (lean * v[2] + far * v[4])
+            ((rr, ra), (_, aa)), volume = widened(inner, [u[0], u[AXIAL]], [v[0], v[AXIAL]], w11, w12, w22)
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
             found.append((value + math.log(weight / (count * width)), x, width, i, True))
             left = min(left, rr - ra * ra / (aa + scale**-2))
@@ -337,9 +337,9 @@ class ContactFit:
         place = part.first_along / part.along if is_along else (part.first - part.first_along) / rest
         place = min(max(place, start), end)
         variance = max(0.0, (part.second - 2.0 * place * part.first) / part.mass + place * place)
-        force, explained, (s11, s12, s22) = link.force(place)
+        explained, force, (s11, s12, s22) = link.force(place)
         step = 0.5 * (end - start) / len(self._row[0])
-        ahead, _, _ = link.force(place + step)
+        _, ahead, _ = link.force(place + step)
         d1, d2 = (ahead[0] - force[0]) / step, (ahead[1] - force[1]) / step
         size = math.hypot(*force) + CONTACT.smallest_force
         u1, u2 = force[0] / size, force[1] / size
@@ -357,6 +357,6 @@ class ContactFit:
             force_sd=math.sqrt(radial),
             direction_sd=min(math.sqrt(about) / size, math.pi),
             torque_position_sd=link.torque_position_sd(place, force),
-            force_at_end=link.force(end)[0],
+            force_at_end=link.force(end)[1],
             residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
