@@ -89,7 +89,7 @@ def test_the_pose_is_as_late_as_the_torques(sensors: bool, cycle: int) -> None:
     def push(time: float) -> np.ndarray:
         if time > 0.2:
             found = observer.torques()[0]
-            late.append(np.abs(found - torques(observer.pose, *at)).max())
+            late.append(np.abs(found - torques(observer.seen.pose, *at)).max())
             now.append(np.abs(found - torques(observer.q, *at)).max())
         return torques(plant.data.qpos, *at)
 

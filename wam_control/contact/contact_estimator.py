@@ -116,12 +116,10 @@ class ContactEstimator:
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._fusion = ContactFusion(parameters.inference.fusion_time)
-        self._in_contact = self._is_above = self._is_blind = False
-        self._ended = -math.inf  # by the age of the observer, s
-        # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
-        self._before: tuple[float, Array | None, float] = 0.0, None, 0.0
+        self._is_blind = False
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
         self.refused = 0
+        self._forget()
 
     def brake(self, on: bool) -> None:
         """Set whether brakes hold the motors, whose torques then carry no information."""
@@ -140,10 +138,16 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
-        self._before = 0.0, None, 0.0
-        self._fusion.reset()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Forget what was estimated."""
         self._in_contact = self._is_above = False
-        self._ended = -math.inf
+        self._ended = -math.inf  # by the age of the observer, s
+        # of the estimates at the last two ages: age of the observer, s, and torques, N m
+        none: tuple[float, Array | None] = 0.0, None
+        self._before, self._last = none, none
+        self._fusion.reset()
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -182,19 +186,18 @@ class ContactEstimator:
         external = tuple(torques.tolist())
         sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
         if not observer.is_ready:
-            self._in_contact = self._is_above = False
-            self._ended = -math.inf
-            self._fusion.reset()
+            self._forget()
             reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
             return ContactEstimate(external, sd, 0.0, reasons=reason)
+        if observer.age != self._last[0]:
+            self._before, self._last = self._last, (observer.age, torques)
         precision = inverse(covariance)
-        statistic = detection_statistic(torques, precision)
-        late = self._late(torques, precision, statistic)
+        statistic = size = detection_statistic(torques, precision)
         is_calm = self._in_contact or observer.age - self._ended > CONTACT.shaking_time
         fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
             quick = detection_statistic(fast[0], inverse(fast[1]))
-            statistic = max(statistic, quick / CONTACT.sudden)
+            statistic = max(size, quick / CONTACT.sudden)
         was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
         if was_in_contact and not self._in_contact:
             self._ended = observer.age
@@ -204,23 +207,19 @@ class ContactEstimator:
                 self._fusion.reset()
             return ContactEstimate(external, sd, statistic, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
-        now = observer.moment() if parameters.inference.fusion_time else None
-        hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
-        hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
+        now = observer.moment(torques) if parameters.inference.fusion_time else None
+        late = self._late(torques, precision, size)
+        hypotheses = self._inference.infer(observer.seen.pose, torques, precision, load, self._fusion, now, late)
         return ContactEstimate(external, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
 
     def _late(self, torques: Array, precision: Array, statistic: float) -> float:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
-        then, before, late = self._before
+        then, before = self._before
+        if before is None:
+            return 0.0
+        change = float(precision.dot(torques).dot(torques - before))
         passed = self._observer.age - then
-        if before is not None and not passed:
-            return late
-        late = 0.0
-        if before is not None and passed > 0.0:
-            change = float(precision.dot(torques).dot(torques - before))
-            late = self._delay / passed * abs(change) / max(statistic, CONTACT.smallest_statistic)
-        self._before = self._observer.age, torques, late
-        return late
+        return self._delay / passed * abs(change) / max(statistic, CONTACT.smallest_statistic)
 
     def _is_touched(self, is_pressing: bool) -> bool:
         """Whether something is detected, or was while the arm pressed on it, and the arm has not left it since."""
@@ -242,10 +241,3 @@ class ContactEstimator:
     def model_errors(self) -> dict[str, TrackedError]:
         """Errors of the model that are tracked between contacts, by name; of joint sensors none."""
         return self._observer.model_errors
-
-
-def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
-    """The same where the force has changed by a fraction that the torques do not show yet."""
-    if hypothesis.is_lower_bound:
-        return hypothesis
-    return hypothesis._replace(force_sd=math.hypot(hypothesis.force_sd, late * math.hypot(*hypothesis.force)))

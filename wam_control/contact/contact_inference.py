@@ -121,12 +121,13 @@ class ContactInference:
 
     def infer(
         self,
-        q: Sequence[float],
+        q: ArrayLike,
         torques: ArrayLike,
         precision: Array,
         load: Array | None = None,
         fusion: ContactFusion | None = None,
         now: Torques | None = None,
+        late: float = 0.0,
     ) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
 
@@ -138,6 +139,7 @@ class ContactInference:
         load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
         fusion : earlier moments of the same contact, to which this one is added; None for this one alone.
         now : the same torques with what is known of their errors, for `fusion`.
+        late : by which fraction the force has changed that the torques do not show yet.
 
         Returns
         -------
@@ -148,10 +150,9 @@ class ContactInference:
         if (size := float(precision.trace())) > (10.0 * CONTACT.smallest_sd) ** -2:
             fusion = None  # together they would be as exact
         if size > CONTACT.smallest_sd**-2:
-            precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(q)))
-        at = np.array(q)
-        self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
-        rows = np.zeros((links + 1, 7, len(q)))  # the last are those of a payload
+            precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(precision)))
+        self.jacobians = np.array([self._body.cover_jacobian(q, cover.name) for cover in self._covers])
+        rows = np.zeros((links + 1, 7, len(precision)))  # the last are those of a payload
         rows[:, 0] = torques
         np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
         if load is not None:
@@ -170,20 +171,22 @@ class ContactInference:
         if fusion is not None and now is not None:
             moments = fusion.count
             fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
-        reasons = NO_REASON
+        reasons, doubtful = NO_REASON, 0.5
         if best.probability < given.identification_threshold:
-            reasons = self._why_ambiguous(q, set(order[:2]), fits)
+            reasons, doubtful = self._why_ambiguous(q, set(order[:2]), fits), CONTACT.noted_probability
         if 1.0 - sum([fit.probability for fit in fits]) > CONTACT.noted_probability:
             reasons |= Reason.PAYLOAD
-        return tuple([self._hypothesis(q, i, fits[i], reasons, moments) for i in order])
+        found = []
+        for i in order:
+            own = reasons | Reason.ALONG if fits[i].along > doubtful else reasons
+            found.append(self._hypothesis(q, i, fits[i], own, moments, late))
+        return tuple(found)
 
-    def _hypothesis(self, q: Sequence[float], i: int, fit: Fit, reasons: Reason, moments: int) -> Hypothesis:
+    def _hypothesis(self, q: ArrayLike, i: int, fit: Fit, reasons: Reason, moments: int, late: float) -> Hypothesis:
         cover = self._covers[i]
         start, end = cover.start[0], cover.end[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > end - start
         residual = fit.residual / moments
-        if fit.along > (CONTACT.noted_probability if reasons & ~Reason.PAYLOAD else 0.5):
-            reasons |= Reason.ALONG
         if is_unknown:
             reasons |= self._why_unknown(q, i, fit)
         if residual > self._parameters.largest_residual:
@@ -201,7 +204,7 @@ class ContactInference:
             low=fit.low,
             high=fit.high,
             force=force,
-            force_sd=math.nan if is_unknown else fit.force_sd,
+            force_sd=math.nan if is_unknown else math.hypot(fit.force_sd, late * math.hypot(*force)),
             is_lower_bound=is_unknown,
             direction=math.atan2(f2, f1),
             direction_sd=fit.direction_sd,
@@ -210,7 +213,7 @@ class ContactInference:
             reasons=reasons,
         )
 
-    def _why_unknown(self, q: Sequence[float], i: int, fit: Fit) -> Reason:
+    def _why_unknown(self, q: ArrayLike, i: int, fit: Fit) -> Reason:
         """Why the position on a cover is unknown."""
         if self._covers[i].is_moment_only:
             return Reason.MOMENT_ONLY
@@ -226,7 +229,7 @@ class ContactInference:
                 return Reason.SHOULDER
         return Reason.WEAK
 
-    def _why_ambiguous(self, q: Sequence[float], likeliest: set[int], fits: list[Fit]) -> Reason:
+    def _why_ambiguous(self, q: ArrayLike, likeliest: set[int], fits: list[Fit]) -> Reason:
         """Why the link is not identified."""
         i = self._elbow
         if i is not None and likeliest == {i - 1, i}:
@@ -238,7 +241,7 @@ class ContactInference:
                 return Reason.ELBOW
         return Reason.LINKS
 
-    def _at_elbow(self, q: Sequence[float], i: int, fit: Fit) -> tuple[float, float, float]:
+    def _at_elbow(self, q: ArrayLike, i: int, fit: Fit) -> tuple[float, float, float]:
         """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""
         cover = self._covers[i]
         inner, outer = (self._body.cover_pose(q, self._covers[j].name).rotation for j in (i - 1, i))

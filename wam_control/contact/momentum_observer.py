@@ -62,7 +62,6 @@ class MomentumObserver:
     Attributes
     ----------
     age : s, since the first sample.
-    is_ready : whether enough samples came.
     seen : the moment of which torques were last given.
     """
 
@@ -104,7 +103,7 @@ class MomentumObserver:
         self._errors = ModelErrors(
             prior, parameters.drift, side.map.motor_from_joint.T, noise, parameters.motor_torque_sd**2
         )
-        self._filters = _Filters(n, (5 if use_joint_sensors else 14 + 2 * len(LOG_DISTANCES)) * n, times, cycle)
+        self._filters = _Filters(n, (3 if use_joint_sensors else 14 + 2 * len(LOG_DISTANCES)) * n, times, cycle)
         self.seen = self._begin()
 
     def reset(self) -> None:
@@ -119,8 +118,17 @@ class MomentumObserver:
         self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
-        self.is_ready = False
         return self._observation()
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether enough samples came.
+
+        Releasing the brakes gives a jolt that the model does not predict; half a cycle of a dither would look like a
+        push.
+        """
+        settled = CONTACT.settled * self._parameters.time_constant
+        return self.age > settled and self._filters.count >= max(2, 2 * self._filters.cycle)
 
     @property
     def q(self) -> list[float]:
@@ -175,28 +183,27 @@ class MomentumObserver:
             links = self._side.links(driven, speed, last.links, span)
             momentum = (links.momentum + rotors.dot(speed)).tolist()
             inertia, speed, qd = driven + rotors, links.velocity, links.velocity.tolist()
-        bias = body.momentum_bias(at, speed).tolist()
-        known = list(map(sub, bias, friction)) if friction else bias
-        is_first = not self._filters.count
-        if is_first:
-            external, model, qdd = [0.0] * self._n, [-torque for torque in bias], [0.0] * self._n
-        else:
+        known = bias = body.momentum_bias(at, speed).tolist()
+        if friction:
+            known = list(map(sub, bias, friction))
+        if self._filters.count:
             model = left = _unexplained(momentum, last.momentum, bias, last.bias, span)
             if friction:
                 left = _unexplained(momentum, last.momentum, known, last.known, span)
-            external, qdd = list(map(sub, left, tau)), [change / span for change in map(sub, qd, last.qd)]
-        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0)):
+            external, before = list(map(sub, left, tau)), last.qd
+        else:
+            external, model, before = [0.0] * self._n, [-torque for torque in bias], qd
+        present = [*external, *model, *q]
+        if not math.isfinite(sum(momentum, sum(present))):
             self._gap += dt
             return False
-        present = np.array([*external, *model, *q, *qd, *qdd])
-        self._filters.take(np.concatenate((present, signals)) if friction else present, span)
+        if friction:
+            qdd = [change / span for change in map(sub, qd, before)]
+            self._filters.take(np.concatenate(([*present, *qd, *qdd], signals)), span)
+        else:
+            self._filters.take(np.array(present), span)
         self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias, links), 0.0
-        # releasing the brakes gives a jolt that the model does not predict;
-        # half a cycle of a dither would look like a push
         self.age += span
-        settled = CONTACT.settled * self._parameters.time_constant
-        if not is_first and self.age > settled and self._filters.count >= 2 * self._filters.cycle:
-            self.is_ready = True
         return True
 
     def torques(self) -> tuple[Array, Array]:
@@ -210,11 +217,9 @@ class MomentumObserver:
         torques, covariance = self._errors.corrected(self.seen)
         return torques, self._errors.size * covariance
 
-    def moment(self) -> Torques:
-        """The external torques last given, with what is known of their errors."""
-        seen = self.seen
-        torques = seen.residual - seen.effects.dot(self._errors.errors)
-        return Torques(self.age, torques, *self._errors.parts(seen), seen.pose)
+    def moment(self, torques: Array) -> Torques:
+        """The external torques last given, (n,), N m, with what is known of their errors."""
+        return Torques(self.age, torques, *self._errors.parts(self.seen), self.seen.pose)
 
     def fast_torques(self) -> tuple[Array, Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
@@ -228,12 +233,6 @@ class MomentumObserver:
         if self.is_ready and not self._is_link_side:
             self._errors.follow(self.seen, statistic, in_contact, self.age - self._followed)
             self._followed = self.age
-
-    @property
-    def pose(self) -> list[float]:
-        """Joint angles, (n,), rad, as late as the torques last given: through their filter."""
-        pose: list[float] = self.seen.pose.tolist()
-        return pose
 
     @property
     def load_torques(self) -> Array | None:
