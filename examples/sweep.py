@@ -19,7 +19,7 @@ from wam_sim.batch import processes, results
 from wam_sim.progress import Progress
 from wam_sim.simulation import Simulation
 
-NEWTONS = 10.0
+NEWTONS, LARGEST = 10.0, 0.2  # commanded force, N, and largest gain, m/s/N
 TASK = [
     ScenarioStep("release", 0.3, request="enable"),
     ScenarioStep("press", 2.0, force=ForceCommand("link", (0.0, -NEWTONS, 0.0))),
@@ -45,13 +45,11 @@ def press(gain: float) -> Press:
 
 
 def largest_stable_gain() -> float:
-    """The largest gain that the guard accepts as stable for every step, m/s/N; it knows nothing of the simulation."""
-    shared = (configuration := Configuration.load(packaged("testbed"))).shared
-    parameters = configuration.node("force_loop", ForceLoopParameters)
-    assessment = ForceLoop(shared.arm, shared.servo, parameters, shared.timing).assessment
-    if assessment is None:
-        raise SystemExit("guard.mode is off in the configuration testbed")
-    return assessment.scale * parameters.guard.stability_fraction * parameters.force_gain[0]
+    """The gain to which the guard lowers a larger one, m/s/N; it knows nothing of the simulation."""
+    values = {"force_loop:force_gain": [LARGEST], "force_loop:guard.mode": "limit"}
+    configuration = Configuration.load(packaged("testbed")).with_values(values)
+    shared, parameters = configuration.shared, configuration.node("force_loop", ForceLoopParameters)
+    return ForceLoop(shared.arm, shared.servo, parameters, shared.timing).parameters.force_gain[0]
 
 
 def main() -> None:
@@ -60,7 +58,7 @@ def main() -> None:
     parser.add_argument("--gains", type=int, default=100, help="default: %(default)s")
     parser.add_argument("--picture", default="sweep.png", help="default: %(default)s")
     given = parser.parse_args()
-    gains = np.geomspace(0.002, 0.2, given.gains).tolist()
+    gains = np.geomspace(0.002, LARGEST, given.gains).tolist()
     with processes() as executor:
         found = results(press, gains, executor, report=Progress("sweep", sys.stderr))
     steady = [row.gain for row in found if row.ripple < 0.1 * NEWTONS]
