@@ -9,6 +9,7 @@ from wam_description.event import Code, Event
 from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
 
+ALSO: Final = "; also: "  # between two events
 REASONS: Final = {
     Reason.MOMENT_ONLY: "on this link only the moment is measured: the contact position is unknown, and the estimated "
     "force is a lower bound",
@@ -207,7 +208,12 @@ def _digits(values: Mapping[str, Any]) -> int:
 
 def sentences(events: Iterable[Event]) -> str:
     """Several events in words, each once."""
-    return "; also: ".join(filter(None, dict.fromkeys(map(sentence, events))))
+    return ALSO.join(filter(None, dict.fromkeys(map(sentence, events))))
+
+
+def in_lines(text: str) -> str:
+    """The words of several events for a terminal, each on a line of its own."""
+    return text.replace(ALSO, f"\n    {ALSO.removeprefix('; ')}")
 
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:

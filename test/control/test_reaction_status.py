@@ -6,7 +6,7 @@ import pytest
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_description.event import OBEYED, Code, Event, Level, holding, refused, warning
-from wam_description.event_text import sentence
+from wam_description.event_text import in_lines, sentence, sentences
 from wam_description.signals import BASE, NodeStatus
 from wam_description.status import pairs, parse, with_refused
 from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
@@ -58,6 +58,11 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
 def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: str) -> None:
     assert words in sentence(event)
     assert words or not sentence(event)
+
+
+def test_each_of_several_events_is_a_line_at_a_terminal() -> None:
+    text = sentences([refused("a", "no effect"), Event(Code.DONE)])
+    assert in_lines(text).splitlines() == ["no effect", "    also: done"]
 
 
 @pytest.mark.parametrize(
