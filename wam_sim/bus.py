@@ -32,16 +32,16 @@ class Bus:
     """
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
-        self._routes = {
-            name: _Route(_Kept(_ROWS[topic.type], topic.type in _FRAMED) if topic.type in _ROWS else None)
-            for name, topic in topics.items()
-        }
+        self._takers: dict[str, list[_Take]] = {name: [] for name in topics}
+        self._kept = {name: _Kept(_ROWS[topic.type]) for name, topic in topics.items() if topic.type in _ROWS}
+        for name, kept in self._kept.items():
+            self.listen(name, kept.add)
         self._rows: Rows = {}
         self._outlets: dict[str, _Outlets] = {}  # by node
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
         """Call a function with stamp, ns, and value of each message of a topic."""
-        self._routes[topic].takers.append(take)
+        self._takers[topic].append(take)
 
     def connect(
         self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
@@ -56,14 +56,14 @@ class Bus:
         """
         outlets = self._outlets[declaration.name] = _Outlets(declaration)
         for name in declaration.outputs:
-            outlets[name] = _checked(self._routes.setdefault(name, _Route()).publish, checks.get(name))
+            outlets[name] = _checked(self.publisher(name), checks.get(name))
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
-            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route()).publish
+            outlets[name] = self.publisher(of_node(declaration.name, name))
         # a node of the stack reads what it declares, as the same bits over topics show: it needs no mask
         is_masked = not is_packaged(declaration)
         for topic, found in feeds.items():
             reactions = [(_inlet(feed, topic, is_masked), feed.work) for feed in found]
-            self._routes.setdefault(topic, _Route()).takers.append(_taker(reactions, outlets))
+            self._takers.setdefault(topic, []).append(_taker(reactions, outlets))
 
     def publish_of(self, node: str, stamp: int, outputs: Outputs) -> None:
         """Publish what a connected node returned elsewhere than in a step, as its steps' outputs are published."""
@@ -72,17 +72,24 @@ class Bus:
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value of a stamp, ns, and what the nodes publish in turn."""
-        self._routes[topic].publish(stamp, value)
+        for take in self._takers[topic]:
+            take(stamp, value)
 
-    def publisher(self, topic: str) -> Callable[[int, Any], None]:
+    def publisher(self, topic: str) -> "_Outlet":
         """What `publish` does on one topic, as a function of stamp and value."""
-        return self._routes[topic].publish
+        takers = self._takers.setdefault(topic, [])
+
+        def publish(stamp: int, value: Any) -> None:
+            for take in takers:
+                take(stamp, value)
+
+        return publish
 
     @property
     def rows(self) -> Rows:
         """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
-        for name, route in self._routes.items():
-            if route.kept is not None and (rows := route.kept.taken()):
+        for name, kept in self._kept.items():
+            if rows := kept.taken():
                 self._rows.setdefault(name, []).extend(rows)
         return self._rows
 
@@ -92,7 +99,7 @@ def of_node(node: str, topic: str) -> str:
     return f"{node}: {topic}" if topic in EVERY_NODE else topic
 
 
-_Row = list[Any]  # stamp and numbers of a message
+_Row = Callable[[Any], tuple[str, Sequence[float]]]  # frame and numbers of a message
 
 
 class _Kept:
@@ -104,26 +111,25 @@ class _Kept:
     Parameters
     ----------
     row : of a message.
-    is_framed : whether messages have a frame.
     """
 
-    __slots__ = ("_blocks", "_count", "_frame", "_is_framed", "_keep", "_pack", "_row")
+    __slots__ = ("_blocks", "_count", "_frame", "_keep", "_pack", "_row")
 
-    def __init__(self, row: Callable[[int, Any], _Row], is_framed: bool) -> None:
-        self._row, self._is_framed = row, is_framed
+    def __init__(self, row: "_Row") -> None:
+        self._row = row
         self._blocks: list[tuple[str, Struct, list[bytes]]] = []
         self._count, self._frame = 0, ""
 
     def add(self, stamp: int, value: Any) -> None:
         """Keep the numbers of a message."""
-        row = self._row(stamp, value)
-        if len(row) != self._count or (self._is_framed and value.frame != self._frame):
-            self._begin(len(row), value.frame if self._is_framed else "")
-        self._keep(self._pack(*row))
+        frame, numbers = self._row(value)
+        if len(numbers) != self._count or frame != self._frame:
+            self._begin(len(numbers), frame)
+        self._keep(self._pack(stamp, *numbers))
 
     def _begin(self, count: int, frame: str) -> None:
         """Begin a block of messages of so many numbers."""
-        layout, messages = Struct(f"q{count - 1}d"), list[bytes]()
+        layout, messages = Struct(f"q{count}d"), list[bytes]()
         self._blocks.append((frame, layout, messages))
         self._count, self._frame, self._pack, self._keep = count, frame, layout.pack, messages.append
 
@@ -135,32 +141,6 @@ class _Kept:
             for frame, layout, messages in blocks
             for stamp, *values in map(layout.unpack, messages)
         ]
-
-
-class _Route:
-    """One topic.
-
-    Parameters
-    ----------
-    kept : the numbers of its messages; None of a topic without numbers.
-
-    Attributes
-    ----------
-    takers : of its messages.
-    """
-
-    __slots__ = ("kept", "takers")
-
-    def __init__(self, kept: _Kept | None = None) -> None:
-        self.takers: list[_Take] = []
-        self.kept = kept
-
-    def publish(self, stamp: int, value: Any) -> None:
-        """Keep the numbers of a value of a stamp, ns, and hand it to the takers."""
-        if self.kept is not None:
-            self.kept.add(stamp, value)
-        for take in self.takers:
-            take(stamp, value)
 
 
 _Take = Callable[[int, Any], object]
@@ -211,15 +191,15 @@ def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets:
     return take
 
 
-_ROWS: dict[str, Callable[[int, Any], _Row]] = {
-    JOINT_STATE: lambda stamp, value: [stamp, *value[0], *value[1], *value[2]],
-    WRENCH: lambda stamp, value: [stamp, *value.force, *value.torque],
-    POINT: lambda stamp, value: [stamp, *value.position],
-    TABLE: lambda stamp, value: [stamp, *chain.from_iterable(value.rows)],
+_ROWS: dict[str, _Row] = {
+    JOINT_STATE: lambda value: ("", [*value[0], *value[1], *value[2]]),
+    WRENCH: lambda value: (value.frame, [*value.force, *value.torque]),
+    POINT: lambda value: (value.frame, value.position),
+    TABLE: lambda value: (value.frame, [*chain.from_iterable(value.rows)]),
 }
-_FRAMED = {WRENCH, POINT, TABLE}
 
 
 def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
     """A value of a topic of numbers as one row."""
-    return TopicValue(stamp, tuple(_ROWS[topic.type](stamp, value)[1:]), value.frame if topic.type in _FRAMED else "")
+    frame, numbers = _ROWS[topic.type](value)
+    return TopicValue(stamp, tuple(numbers), frame)
