@@ -4,9 +4,6 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
@@ -64,15 +61,14 @@ class CableCircuits:
         self._friction_counts = friction_counts
         self._nominal = self._circuits = arm.circuits
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
-        self._pull = data.qfrc_spring[:n]
-        self._pulls = self._pull.tolist
+        self._pulls: Callable[[], list[float]] = data.qfrc_spring[:n].tolist
         self._stretch_rate, self._theta, self._step = data.ten_velocity[: 2 * n : 2], data.qpos[:n], step
         # two of each strand: it is slack between them; the tight strand comes first and pulls beyond the second, the
         # loose one beyond the first
         self._slack_ends: Any = memoryview(data.plastic)
         # with backlash the ends are those of the play
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
-        self._damping = np.array([circuit.damping for circuit in arm.circuits])
+        self._damping = [circuit.damping for circuit in arm.circuits]
         self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
         self.each: list[tuple[int, int, float, float]] = []
         self._prepare()
@@ -191,21 +187,19 @@ class CableCircuits:
     @property
     def elastic_torque(self) -> list[float]:
         """Elastic torque of each circuit on its rotor, N m, (n,), at the start of the last step."""
-        torque: list[float] = self._pull.tolist()
-        return torque
+        return self._pulls()
 
     @property
-    def torque(self) -> NDArray[np.float64]:
+    def torque(self) -> list[float]:
         """Torque of each circuit at its motor, elastic and damping, N m, (n,), at the start of the last step."""
-        return self._damping * self._stretch_rate - self._pull
+        each = zip(self._damping, self._stretch_rate.tolist(), self._pulls())  # noqa: B905 - costs 1 % of a period
+        return [damping * rate - pull for damping, rate, pull in each]
 
-    def tensions(self, pulls: Sequence[float]) -> list[tuple[float, float]]:
-        """Tension of the tight and of the loose strand of each first stage, N, at elastic torques, N m, (n,)."""
+    def tensions(self, pulls: Sequence[float]) -> list[float]:
+        """Tension of the tight strand of each first stage, N, (n,), at elastic torques of these sizes, N m, (n,)."""
         result = []
         for circuit, pull in zip(self._circuits, pulls, strict=True):
-            difference = abs(pull) / circuit.radius
-            if self._may_slacken and difference > 2.0 * circuit.pretension:
-                result.append((difference, 0.0))
-            else:
-                result.append((circuit.pretension + difference / 2.0, circuit.pretension - difference / 2.0))
+            difference = pull / circuit.radius
+            is_slack = self._may_slacken and difference > 2.0 * circuit.pretension
+            result.append(difference if is_slack else circuit.pretension + difference / 2.0)
         return result

@@ -138,7 +138,6 @@ class Driver:
         self._push_ends: dict[str, int] = {}  # last tick of the present push on each cover
         self._disturbed = ""  # cover that is pushed by messages
         self._last_push = "", 0  # the last pushes of an enabled arm, in words, and the tick in which they acted
-        self._pretension_share = parameters.effects.pretension_share
         self._begin_period(1)
         self._discard()
         self._measure()
@@ -233,8 +232,6 @@ class Driver:
     @property
     def _pushed(self) -> dict[str, Value]:
         """The push that acts, or acted a short time before, s; '' for none."""
-        if now := self.plant.pushes_in_words():
-            return {"push": now, "ago": 0.0}
         pushed, tick = self._last_push
         ago = (self._tick - tick) * self._timing.period
         return {"push": pushed * (ago <= DRIVER.recent), "ago": ago}
@@ -247,7 +244,7 @@ class Driver:
 
     def _largest_tensions(self) -> list[float]:
         """Tension of the tight strand of each cable, N, (n,), the largest since the last check."""
-        tensions = self.plant.tight_tensions(list(map(max, self._zero, *self._pulls)))
+        tensions = self.plant.tensions(list(map(max, self._zero, *self._pulls)))
         self._pulls.clear()
         return tensions
 
@@ -296,9 +293,7 @@ class Driver:
         """Take the effects that can change while the arm runs: added friction, active pretension."""
         effects.require_fit(self._arm)
         self.set_added_friction(effects.added_coulomb_friction)
-        if effects.pretension_share != self._pretension_share:
-            self.plant.set_pretension(effects.pretension_share)
-            self._pretension_share = effects.pretension_share
+        self.plant.set_pretension(effects.pretension_share)
 
     # what a node of a direct run may request by name
 

@@ -115,7 +115,7 @@ class Plant:
         n = self._n = len(arm.motors.names)
         self._brakes, self._effects = [brake_torque] * n, effects
         self._arm, self._carried = arm, 0.0
-        self._motor_from_joint = TransmissionMap.of(arm).motor_from_joint
+        self._map = TransmissionMap.of(arm)
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)
@@ -136,8 +136,7 @@ class Plant:
         self._rest()
         require_free_start(self.model, self.data, arm, world)
         self._kept = self._view.position.tolist(), self._view.plastic.tolist()
-        if set(effects.pretension_share) != {1.0}:
-            self.set_pretension(effects.pretension_share)
+        self.set_pretension(effects.pretension_share)
         require_fitting_step(self.model, arm, world, step)
 
     def _rest(self) -> None:
@@ -148,11 +147,11 @@ class Plant:
         for one in self._moving:
             one.lead(0.0)
         view.q[:] = arm.joints.start
-        view.theta[:] = self._motor_from_joint @ view.q
+        view.theta[:] = self._map.motor_from_joint @ view.q
         mujoco.mj_forward(self.model, data)
         load = view.bias - view.spring
-        torque = np.linalg.solve(self._motor_from_joint.T, load)
-        view.theta[:] = self._motor_from_joint @ view.q + [
+        torque = np.linalg.solve(self._map.motor_from_joint.T, load)
+        view.theta[:] += [
             _stretch(tau, circuit, effects.slack, effects.play(i))
             for i, (tau, circuit) in enumerate(zip(torque.tolist(), arm.circuits, strict=True))
         ]
@@ -328,8 +327,7 @@ class Plant:
     def _transmitted_torque(self) -> list[float]:
         """Elastic torque of the cables on rotors, then on joints, N m, (2 n,), at the start of the last step."""
         at_rotors = self._circuits.elastic_torque
-        at_joints: list[float] = (-(at_rotors @ self._motor_from_joint)).tolist()
-        return at_rotors + at_joints
+        return at_rotors + [-torque for torque in self._map.joint_torques(at_rotors)]
 
     def _friction_torque(self) -> list[float]:
         """Dry friction on rotors, then on joints, N m, (2 n,), in the last step."""
@@ -368,28 +366,21 @@ class Plant:
     @property
     def circuit_torque(self) -> list[float]:
         """Torque of each cable circuit at its motor, N m, (n,), at the start of the last step."""
-        torque: list[float] = self._circuits.torque.tolist()
-        return torque
-
-    @property
-    def tensions(self) -> list[tuple[float, float]]:
-        """Tension of the tight and of the loose strand of each first stage, N, at the start of the last step."""
-        return self._circuits.tensions(self._circuits.elastic_torque)
+        return self._circuits.torque
 
     @property
     def cable_pull(self) -> list[float]:
         """Size of the elastic torque of each cable circuit, N m, (n,), at the start of the last step."""
         return list(map(abs, self._circuits.elastic_torque))
 
-    def tight_tensions(self, pulls: Sequence[float]) -> list[float]:
+    def tensions(self, pulls: Sequence[float]) -> list[float]:
         """Tension of the tight strand of each first stage, N, (n,), which grows with the `cable_pull`, N m, (n,)."""
-        return [tight for tight, _ in self._circuits.tensions(pulls)]
+        return self._circuits.tensions(pulls)
 
     @property
     def cable_torque(self) -> list[float]:
         """Torque of the cables on the joints, N m, (n,), at the start of the last step."""
-        torque: list[float] = self._circuits.torque.dot(self._motor_from_joint).tolist()
-        return torque
+        return self._map.joint_torques(self._circuits.torque)
 
     @property
     def strain_torque(self) -> list[float]:
