@@ -79,7 +79,6 @@ class CoverLoads:
         self._body = {name: model.body(link).id for name, link in zip(covers.names, covers.links, strict=True)}
         self._springs = list(_springs_on_covers(model, arm, springs))
         self.pushes: dict[str, AppliedPush] = {}
-        self._wrench = np.zeros(6)
         turned = np.zeros(6)
         self._turned = turned[:3], turned[3:]  # force and torque of a push in the base frame
         self._turn = partial(Struct("6d").pack_into, turned.data, 0)
@@ -180,7 +179,7 @@ class CoverLoads:
                 if geom in self._cover_of_geom:
                     cover = self._cover_of_geom[geom]
                     rotation = self._rotation[cover]
-                    force = rotation.T.dot(sign * contact_force(self._model, data, i, self._wrench))
+                    force = rotation.T.dot(sign * contact_force(self._model, data, i))
                     at = rotation.T.dot(data.contact.pos[i] - self._origin[cover])
                     yield cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
 
@@ -211,8 +210,9 @@ def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
 
 
-def contact_force(model: Any, data: Any, i: int, wrench: np.ndarray) -> np.ndarray:
-    """Force of contact i on its second geom, (3,), N, in the base frame; `wrench` (6,) is overwritten."""
+def contact_force(model: Any, data: Any, i: int) -> np.ndarray:
+    """Force of contact i on its second geom, (3,), N, in the base frame."""
+    wrench = np.zeros(6)
     mujoco.mj_contactForce(model, data, i, wrench)
     force: np.ndarray = data.contact.frame[i].reshape(3, 3).T.dot(wrench[:3])
     return force

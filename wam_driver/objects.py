@@ -76,7 +76,7 @@ class TrueObjects:
         self._bodies = [model.body(name).id for name in self.names]
         doors = (door.name for door in world.doors.present)
         self._angles = {name: int(model.joint(hinge_name(name)).qposadr[0]) for name in doors}
-        self._motion, self._wrench = np.zeros(6), np.zeros(6)
+        self._motion = np.zeros(6)
 
     def measure(self) -> list[ObjectState]:
         """The state of every object at the start of the last step."""
@@ -106,7 +106,7 @@ class TrueObjects:
             first, second = data.contact.geom[k].tolist()
             touched = [(geom, sign) for geom, sign in ((first, -1.0), (second, 1.0)) if geom in self._index]
             if touched:
-                force = contact_force(self._model, data, k, self._wrench)
+                force = contact_force(self._model, data, k)
                 is_arm = first in self._covers or second in self._covers
                 for geom, sign in touched:
                     i = self._index[geom]

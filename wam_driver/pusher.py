@@ -8,6 +8,7 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_description.parameters import rows
+from wam_description.small_matrices import cross
 
 
 class Pusher:
@@ -99,6 +100,4 @@ class Pusher:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross product of two vectors; NumPy's takes ten times as long."""
-    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
-    return np.array((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0))
+    return np.array(cross(a.tolist(), b.tolist()))

@@ -46,10 +46,10 @@ def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.
     configuration = CONFIGURATION.with_values(given)
     run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), *steps])
     model, data = run.driver.plant.model, run.driver.plant.data
-    rod, wrench, forces, reactions = model.geom(NAMES[0]).id, np.zeros(6), [], []
+    rod, forces, reactions = model.geom(NAMES[0]).id, [], []
     while not run.step():
         pressing = [i for i in range(data.ncon) if rod in data.contact.geom[i]]
-        forces.append(sum(abs(np.dot(DIRECTION, contact_force(model, data, i, wrench))) for i in pressing))
+        forces.append(sum(abs(np.dot(DIRECTION, contact_force(model, data, i))) for i in pressing))
         reactions.append(run.nodes["force_loop"].event.code)
     begin = round(1e3 * RANGES.release)
     return np.array(forces[begin:]), reactions[begin:]

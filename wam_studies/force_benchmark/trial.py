@@ -119,7 +119,6 @@ class TaskWatch:
         self._directions = [np.array(surface.direction) for surface, _ in task.forces]
         self._surfaces = {run.driver.plant.model.geom(name).id: i for i, name in enumerate(NAMES[: len(task.forces)])}
         self._node = run.nodes["force_loop"]
-        self._wrench = np.zeros(6)
 
     def traces(self) -> list[TaskTrace]:
         """Play the task to its end, or until it has been stopped for `STOPPED`; what was seen of each force."""
@@ -169,7 +168,7 @@ class TaskWatch:
         model, data = self._run.driver.plant.model, self._run.driver.plant.data
         total = [0.0] * len(self._directions)
         for i in range(data.ncon):
-            force = contact_force(model, data, i, self._wrench)  # on the second
+            force = contact_force(model, data, i)  # on the second
             for geom, sign in zip(data.contact.geom[i].tolist(), (-1.0, 1.0), strict=True):
                 if (k := self._surfaces.get(geom)) is not None:
                     total[k] += sign * float(self._directions[k] @ force)
