@@ -57,8 +57,7 @@ class ArmDriver(StackNode):
         self.serve("estop", Trigger, lambda _: self.estop())
         self.serve("reset_fault", Trigger, lambda _: self.reset_fault())
         self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
-        self.create_timer(NODE_LIMITS.claim_period, self._forget_nodes)
-        self.create_timer(NODE_LIMITS.claim_period, self._inform)
+        self.create_timer(NODE_LIMITS.claim_period, self._look_at_nodes)
 
     # what a driver adds
 
@@ -181,12 +180,13 @@ class ArmDriver(StackNode):
                 self.safety.restate(event)
             self.trip(event)
 
-    def _forget_nodes(self) -> None:
-        """Drop the problem of a node that has ended, or never was, as its status was replayed."""
+    def _look_at_nodes(self) -> None:
+        """Drop the problem of a node that has ended, or never was, as its status was replayed; inform the user."""
         for concerned in [problem for problem in self.health.problems if problem.startswith(PARAMETERS)]:
             node = concerned.removeprefix(PARAMETERS)
             if node not in self.peers.names and node not in self.get_node_names():
                 self.health.set_problem(concerned, None)
+        self._inform()
 
     def _take_currents(self, stamp: int, command: State) -> None:
         if not 0 < stamp <= self.stamp:

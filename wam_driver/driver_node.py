@@ -32,13 +32,11 @@ class DriverNode(ArmDriver):
         self.safety = self.driver.safety
         follow(self, own, lambda new: self.driver.set_effects(new.effects))
         self._directory = own.post_mortem_directory
-        self._started = timing.mode == "realtime"
         self.inlets.feed("sim/disturbance", self._take_push)
         self.serve("pause", SetBool, self._pause)
         self.serve("reset", Trigger, lambda _: self.driver.reset())
         self.serve("step", Trigger, lambda _: self.time.step())
         self._try_post_mortem()
-        self._watching = self.create_timer(0.02, self._look_for_start)
         self.time: Lockstep | Realtime
         if timing.mode == "lockstep":
             self.time = Lockstep(
@@ -113,7 +111,7 @@ class DriverNode(ArmDriver):
     @property
     def awaited(self) -> str:
         """Nodes without which lockstep does not start, '' once it has."""
-        if self._started:
+        if self.time.is_started:
             return ""
         return ", ".join(self.peers.absent or self.session.silent) or "the peers of the driver"
 
@@ -126,25 +124,21 @@ class DriverNode(ArmDriver):
         """Whether a realtime driver waits for all nodes, and for a computer that keeps the periods."""
         return isinstance(self.time, Realtime) and (bool(self.peers.absent) or self.time.settles())
 
-    def _look_for_start(self) -> None:
-        """Begin lockstep when all peers are connected and follow this driver."""
-        if not self.health.is_ready or self.peers.absent:
-            return
-        if not self._started:
-            if not self.session.number or self.session.is_overtaken:
-                self.session.begin()
-                self.announce()
-            if self.session.silent:
-                return
-            self._started = True
-            self.time.start()
-        self._watching.cancel()
-
     def _watch_lockstep(self) -> None:
         assert isinstance(self.time, Lockstep)
         self.time.watch()
+        if not self.time.is_started and self.health.is_ready and not self.peers.absent:
+            self._begin()
         if self.time.start_overdue:
             self.announce()
+
+    def _begin(self) -> None:
+        """Begin lockstep when all peers follow this driver."""
+        if not self.session.number or self.session.is_overtaken:
+            self.session.begin()
+            self.announce()
+        if not self.session.silent:
+            self.time.start()
 
     # what comes in and goes out
 

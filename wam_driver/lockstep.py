@@ -45,6 +45,7 @@ class Lockstep:
     Attributes
     ----------
     pacer : determines when a period is due; also measures.
+    is_started : whether the first state was published.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class Lockstep:
         self.pacer = Pacer(timing.real_time_factor, now)
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
-        self._started = self.is_paused = False
+        self.is_started = self.is_paused = False
         self._patience = timing.timeout
         self._roll_call = timing.timeout - min(DRIVER.roll_call, 0.5 * timing.timeout)
         self._is_called = False
@@ -76,7 +77,7 @@ class Lockstep:
 
     def start(self) -> None:
         """Publish the first state."""
-        self._started = True
+        self.is_started = True
         self._waited = 0.0
         self._publish()
 
@@ -102,7 +103,7 @@ class Lockstep:
 
     def go_on(self) -> None:
         """Advance by a period if all is there and it is due."""
-        if not self._started or self.is_paused or self.missing:
+        if not self.is_started or self.is_paused or self.missing:
             return
         if self.pacer.is_due(self._driver.stamp + self._timing.period_ns):
             self._patience = self._timing.timeout
@@ -120,7 +121,7 @@ class Lockstep:
         now = self._now()
         self._waited += min(now - self._looked, DRIVER.longest_look)
         self._looked = now
-        if not self._started or self.is_paused or not (missing := self.missing):
+        if not self.is_started or self.is_paused or not (missing := self.missing):
             return
         if self._waited >= self._roll_call and not self._is_called:
             self._is_called = True
@@ -152,7 +153,7 @@ class Lockstep:
     @property
     def start_overdue(self) -> bool:
         """Whether the start is awaited for longer than the time-out."""
-        return not self._started and self._waited >= self._timing.timeout
+        return not self.is_started and self._waited >= self._timing.timeout
 
     lateness = ""  # nothing is late in lockstep
 
@@ -162,7 +163,7 @@ class Lockstep:
 
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
-        if self._started and self._patience < self._timing.timeout:
+        if self.is_started and self._patience < self._timing.timeout:
             return f"no {' and '.join(self._senders)} arrives; {self._advice}; then enable"
         return ""
 

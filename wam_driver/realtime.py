@@ -29,10 +29,10 @@ class Realtime:
     Attributes
     ----------
     command_came : when the last command came, on that clock.
-    start_overdue : never: this time begins at once.
+    is_started, start_overdue : this time begins at once.
     """
 
-    start_overdue = False
+    is_started, start_overdue = True, False
 
     def __init__(
         self,

@@ -108,7 +108,7 @@ class Apart(Stack):
     def refusal(self) -> str:
         """Why the driver refuses to release the brakes, once all nodes are connected, also after a fault."""
         node = self.nodes["driver"]
-        self.ros.wait(lambda: node._started and not node.peers.absent, what="all nodes")
+        self.ros.wait(lambda: node.time.is_started and not node.peers.absent, what="all nodes")
         self.driver.reset_fault()
         answer = node.enable()
         assert not answer.success

@@ -66,7 +66,8 @@ class Stack:
     def enable(self) -> None:
         """Until currents have flowed for a while; a node that was frozen may need several tries."""
         node = self.nodes["driver"]
-        self.ros.wait(lambda: node._started and not node.peers.absent and not self.driver_is_new(), what="all nodes")
+        self.ros.wait(lambda: node.time.is_started and not node.peers.absent, what="all nodes")
+        self.ros.wait(lambda: not self.driver_is_new(), what="the session")
         for _ in range(50):
             self.wait_periods(100)
             self.driver.reset_fault()
