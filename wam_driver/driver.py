@@ -317,9 +317,9 @@ class Driver:
         plant, period = self.plant, self._timing.period
         torque = self.amplifier.nominal_torque(self.currents)
         self._turned = theta, thetad = plant.theta, plant.thetad
-        self.motor_state = self._sensors.motors(theta, thetad, torque, period)
+        self.motor_state = self._sensors.motors.read(State(theta, thetad, torque), period)
         if self._arm.joint_sensors:
-            self.joint_sensors = self._sensors.joints(plant.q, plant.qd, plant.strain_torque, period)
+            self.joint_sensors = self._sensors.joints.read(State(plant.q, plant.qd, plant.strain_torque), period)
 
     @property
     def recent(self) -> list[DriverSample]:

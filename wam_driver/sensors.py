@@ -10,32 +10,45 @@ from wam_description.signals import State
 from wam_driver.imperfections import SensorParameters
 
 
-class Encoders:
-    """Angles and velocities of shafts, as measured.
+class SideSensors:
+    """What measures the motors, or the joints: encoders and torques.
 
     With resolution or noise, the velocity is the difference of two readings over a period, as from a real
     counter; otherwise it is the true velocity.
     """
 
-    def __init__(self, resolution: Sequence[float], noise: Sequence[float], random: np.random.Generator) -> None:
-        self._resolution, self._noise, self._random = list(resolution), list(noise), random
-        self._is_perfect = not any(resolution) and not any(noise)
-        self._last: list[float] | None = None
+    def __init__(
+        self,
+        resolution: Sequence[float],
+        noise: Sequence[float],
+        torque_noise: Sequence[float],
+        random: np.random.Generator,
+    ) -> None:
+        self._resolution, self._noise, self._torque_noise = list(resolution), list(noise), list(torque_noise)
+        self._are_encoders_true = not any(resolution) and not any(noise)
+        self._is_torque_true = not any(torque_noise)
+        self._random = random
+        self.reset()
 
     def reset(self) -> None:
         """Discard the last reading, so that the next velocity is zero."""
-        self._last = None
+        self._last: list[float] | None = None
 
-    def read(self, angle: list[float], velocity: list[float], dt: float) -> tuple[list[float], list[float]]:
-        """Angles, rad, and velocities, rad/s, `dt` seconds after the last reading."""
-        if self._is_perfect:
-            return angle, velocity
-        draws = self._random.standard_normal(len(angle)).tolist()
-        read = [a + sd * draw for a, sd, draw in zip(angle, self._noise, draws, strict=True)]
-        read = [round(a / step) * step if step else a for a, step in zip(read, self._resolution, strict=True)]
-        before = self._last
-        self._last = read
-        return read, [0.0] * len(read) if before is None else [(b - a) / dt for a, b in zip(before, read, strict=True)]
+    def read(self, state: State, dt: float) -> State:
+        """What is read of a true state, rad, rad/s and N m, (n,) each, `dt` seconds after the last reading."""
+        if not self._are_encoders_true:
+            noisy = self._with_noise(state.position, self._noise)
+            angle = [round(a / step) * step if step else a for a, step in zip(noisy, self._resolution, strict=True)]
+            velocity = [(b - a) / dt for a, b in zip(self._last or angle, angle, strict=True)]
+            self._last = angle
+            state = State(angle, velocity, state.effort)
+        if not self._is_torque_true:
+            state = state._replace(effort=self._with_noise(state.effort, self._torque_noise))
+        return state
+
+    def _with_noise(self, values: list[float], deviation: list[float]) -> list[float]:
+        draws = self._random.standard_normal(len(values)).tolist()
+        return [value + sd * draw for value, sd, draw in zip(values, deviation, draws, strict=True)]
 
 
 class Sensors:
@@ -43,27 +56,12 @@ class Sensors:
 
     def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
         aligned("sensors", arm.motors.names, parameters)
-        resolution = each(parameters.joint_encoder_resolution, len(arm.joints.names))
-        self._motors = Encoders(parameters.encoder_resolution, parameters.encoder_noise, random)
-        self._joints = Encoders(resolution, parameters.joint_encoder_noise, random)
-        self._strain_noise = parameters.strain_noise
-        self._is_strain_noisy = any(parameters.strain_noise)
-        self._random = random
+        n = len(arm.motors.names)
+        self.motors = SideSensors(parameters.encoder_resolution, parameters.encoder_noise, (0.0,) * n, random)
+        resolution = each(parameters.joint_encoder_resolution, n)
+        self.joints = SideSensors(resolution, parameters.joint_encoder_noise, parameters.strain_noise, random)
 
     def reset(self) -> None:
         """Discard the last readings."""
-        self._motors.reset()
-        self._joints.reset()
-
-    def motors(self, theta: list[float], thetad: list[float], torque: list[float], dt: float) -> State:
-        """Reading of the motor side, (n,) each: rad, rad/s, and the torque from the current, N m."""
-        angle, velocity = self._motors.read(theta, thetad, dt)
-        return State(angle, velocity, torque)
-
-    def joints(self, q: list[float], qd: list[float], strain: list[float], dt: float) -> State:
-        """Reading of the joint side, (n,) each: rad, rad/s, strain torque N m."""
-        angle, velocity = self._joints.read(q, qd, dt)
-        if self._is_strain_noisy:
-            draws = self._random.standard_normal(len(strain)).tolist()
-            strain = [t + sd * draw for t, sd, draw in zip(strain, self._strain_noise, draws, strict=True)]
-        return State(angle, velocity, strain)
+        self.motors.reset()
+        self.joints.reset()
