@@ -8,7 +8,7 @@ no force loop with friction can diverge.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -114,8 +114,9 @@ class SampledLoop:
         float
             0 where not even the smallest scale is stable.
         """
-        still, once = (self.period(q, axes, contact, feedback, scale) for scale in (0.0, 1.0))
-        moving = once - still
+        period = self.period(q, axes, contact, feedback)
+        still = period(0.0)
+        moving = period(1.0) - still
         below = 0.0
         for scale in scales:
             if _grows(still + scale * moving):
@@ -132,8 +133,8 @@ class SampledLoop:
                 below = middle
         return below
 
-    def period(self, q: Sequence[float], axes: Axes, contact: Array, feedback: Feedback, scale: float) -> Array:
-        """The map of one outer period with all gains times `scale`; arguments as in `margin`.
+    def period(self, q: Sequence[float], axes: Axes, contact: Array, feedback: Feedback) -> Callable[[float], Array]:
+        """The map of one outer period as a function of a factor of all gains; arguments as in `margin`.
 
         States: theta, thetad, q, qd, integrals of the velocity loop, filtered force, joint velocities
         commanded one period ago, and those of the law still to come.
@@ -144,19 +145,25 @@ class SampledLoop:
         whole, late = divmod(axes.delay, self.divisor)
         begins = np.cumsum([0, 4 * n, n, p, n, *[n] * whole]).tolist()
         state = np.eye(begins[-1])
-        x, integral, before, commanded, *earlier = (state[a:b] for a, b in pairwise(begins))
+        start, integrals, before, commanded, *earlier = (state[a:b] for a, b in pairwise(begins))
         outer = self.tick * self.divisor
         lag = axes.filter_time + (feedback.lag if feedback.kind == "contact_estimate" else 0.0)
-        force = before + (axes.sense @ shown @ x - before) * outer / (outer + lag)
+        force = before + (axes.sense @ shown @ start - before) * outer / (outer + lag)
         speed = axes.gain[:, None] * force + axes.proportional_gain[:, None] * (force - before) / outer
-        law = [*earlier, -scale * axes.move @ speed]
-        command = law[0] - axes.hold @ (self.joint_from_motor @ x[:n])
-        first, then = self.motor_from_joint @ commanded, self.motor_from_joint @ command
-        for tick in range(self.divisor):
-            error = (first if tick < late else then) - x[n : 2 * n]
-            integral = integral + self.ki * self.tick * error
-            x = drift @ x + drive @ (self.kp * error + integral)
-        return np.vstack([x, integral, force, command, *law[1:]])
+        held = axes.hold @ (self.joint_from_motor @ start[:n])
+
+        def scaled(scale: float) -> Array:
+            x, integral = start, integrals
+            law = [*earlier, -scale * axes.move @ speed]
+            command = law[0] - held
+            first, then = self.motor_from_joint @ commanded, self.motor_from_joint @ command
+            for tick in range(self.divisor):
+                error = (first if tick < late else then) - x[n : 2 * n]
+                integral = integral + self.ki * self.tick * error
+                x = drift @ x + drive @ (self.kp * error + integral)
+            return np.vstack([x, integral, force, command, *law[1:]])
+
+        return scaled
 
     def plant(self, q: Sequence[float], contact: Array, feedback: Feedback) -> tuple[Array, Array]:
         """Rate of the states theta, thetad, q, qd, (4n, 4n), and the torque that the feedback measures.
