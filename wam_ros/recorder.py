@@ -246,22 +246,23 @@ class Recorder:
         self, channel: _Channel, publisher: str, is_foreign: bool, data: bytes, received: int, sent: int, number: int
     ) -> None:
         if self._lockstep:
-            stamp = channel.stamp_of(data)
-            is_unstamped = stamp == 0 and channel.topic.is_numbers  # sent by hand
-            if is_unstamped or is_foreign:  # it came with the newest state
-                stamp = self._newest
-            self._newest = max(self._newest, stamp or 0)
-            is_free = stamp is None or channel.topic.latched  # of the time at which it came
-            if stamp is None:
-                stamp = self._stamps.get(publisher, self._begin)
-            else:
-                self._stamps[publisher] = stamp
-                if len(self._stamps) > RECORDER_LIMITS.publishers * len(self._channels):
-                    del self._stamps[next(iter(self._stamps))]
-            received = sent = max(stamp, self._begin) if is_free else stamp
+            received = sent = self._log_time(channel, publisher, is_foreign, data)
         # anybody can send another stamp
         received, sent = min(max(received, 0), _LATEST), min(max(sent, 0), _LATEST)
         self._try(self._bag.write, channel.name, data, received, sent, number)
+
+    def _log_time(self, channel: _Channel, publisher: str, is_foreign: bool, data: bytes) -> int:
+        """The time of a message in lockstep, ns; one without a stamp of this arm came with the newest state."""
+        stamp = channel.stamp_of(data)
+        if is_foreign or (stamp == 0 and channel.topic.is_numbers):  # numbers without a stamp are sent by hand
+            stamp = self._newest
+        if stamp is None:
+            return max(self._stamps.get(publisher, 0), self._begin)
+        self._newest = max(self._newest, stamp)
+        self._stamps[publisher] = stamp
+        if len(self._stamps) > RECORDER_LIMITS.publishers * len(self._channels):
+            del self._stamps[next(iter(self._stamps))]
+        return max(stamp, self._begin) if channel.topic.latched else stamp
 
     def flush(self) -> None:
         """Write received messages to disk and see that they are there; call it every few tenths of a second."""
