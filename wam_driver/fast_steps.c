@@ -213,7 +213,6 @@ static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ss
   const Plant *plant = PyCapsule_GetPointer(args[0], PREPARED);
   const long count = plant ? PyLong_AsLong(args[1]) : -1;
   if (PyErr_Occurred()) return NULL;
-  if (count < 1) return PyErr_Format(PyExc_ValueError, "count is %ld; it must be 1 or more", count);
   mjData *data = plant->data;
   PyObject *was_slack = PyObject_GetAttrString(plant->circuits, "is_slack");
   if (!was_slack) return NULL;

@@ -180,9 +180,9 @@ class Plant:
 
     def trouble(self) -> str:
         """Why the arm's simulation cannot go on; '' if it can, and `recover` then comes back to the present angles."""
-        if any(self._view.warnings.tolist()):
-            names = [name for name, count in zip(WARNINGS, self._view.warnings.tolist(), strict=True) if count]
-            return " and ".join(WARNINGS[name] for name in names)
+        counts = self._view.warnings.tolist()
+        if any(counts):
+            return " and ".join(text for text, count in zip(WARNINGS.values(), counts, strict=True) if count)
         position: list[float] = self._view.position.tolist()
         if not math.isfinite(sum(self._view.every_velocity.tolist()) + sum(position)):
             return WARNINGS["badqvel"]
@@ -275,13 +275,15 @@ class Plant:
         ValueError
             for another number of steps.
         """
+        if index(count) < 1:
+            raise ValueError(f"count is {count}; it must be 1 or more")
         self._write_torque(0, *torque)
         if self._advance is None:
-            self._velocity = self._advance_in_python(_whole(count))
+            self._velocity = self._advance_in_python(count)
         else:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
 
-    def _advance_in_python(self, count: int) -> list[float]:
+    def _advance_in_python(self, count: SupportsIndex) -> list[float]:
         """Advance by steps with the torque that is set; velocities of rotors and joints before the last, rad/s."""
         model, data, pushes, movers, velocities, lows, highs, direction, after_step = self._in_steps
         velocity = before = velocities()
@@ -409,14 +411,6 @@ class Plant:
     def objects(self) -> list[ObjectState]:
         """The true state of every free body, door and moving obstacle, in the order of `World.objects`."""
         return self._objects.measure()
-
-
-def _whole(count: SupportsIndex) -> int:
-    """A number of steps; the steps in C refuse the same ones."""
-    steps = index(count)
-    if steps < 1:
-        raise ValueError(f"count is {steps}; it must be 1 or more")
-    return steps
 
 
 def _unheard(_: str) -> None:
