@@ -135,8 +135,7 @@ class Driver:
         self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
-        self._push_ends: dict[str, int] = {}  # last tick of the present push on each cover
-        self._disturbed = ""  # cover that is pushed by messages
+        self._disturbed, self._disturbed_until = "", 0  # cover that a message pushes, and the last tick
         self._last_push = "", 0  # the last pushes of an enabled arm, in words, and the tick in which they acted
         self._begin_period(1)
         self._discard()
@@ -179,9 +178,8 @@ class Driver:
         arrival_age : time since the last command arrived, s, on the steady clock; 0 in lockstep.
         """
         enabled = self.safety.mode is Mode.ENABLED
-        for cover, last in list(self._push_ends.items()):
-            if self._tick > last:
-                self._end_push(cover)
+        if self._disturbed and self._tick > self._disturbed_until:
+            self._end_disturbance()
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:
@@ -248,41 +246,34 @@ class Driver:
         self._pulls.clear()
         return tensions
 
-    def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
-        """Push on a cover until the next push on it, for `ages.command` of the arm's time at most; see `Plant.push`.
-
-        Raises
-        ------
-        ValueError
-            for a cover that the arm does not have, or more than the configured largest force or torque.
-        """
-        if excess := self._push_excess(force, torque):
-            raise ValueError(f"{excess}; the last push remains")
-        self.plant.push(cover, force, torque)
-        self._push_ends[cover] = self._tick + self._push_ticks
-
     def disturb(self, wrench: Wrench) -> None:
-        """Take a message of `sim/disturbance`: the one push of messages, in the base frame none.
+        """Take a message of `sim/disturbance`: the one push of messages, in the base frame none; see `Plant.push`.
 
-        It ends the push of the message before where that was on another cover, and no other pushes.
+        It acts until the next message, for `ages.command` of the arm's time at most.
 
         Raises
         ------
         ValueError
-            as `push`, and for a force or torque in the base frame.
+            for a cover that the arm does not have, more than the configured largest force or torque, or a force or
+            torque in the base frame.
         """
-        cover = "" if wrench.frame == BASE else wrench.frame
-        if cover:
-            self.push(cover, wrench.force, wrench.torque)
-        elif any(wrench.force) or any(wrench.torque):
-            raise ValueError(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
-        if self._disturbed not in ("", cover):
-            self._end_push(self._disturbed)
-        self._disturbed = cover
+        cover, *push = wrench
+        if cover in ("", BASE):
+            if any(map(any, push)):
+                raise ValueError(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
+            self._end_disturbance()
+            return
+        if excess := self._push_excess(*push):
+            raise ValueError(f"{excess}; the last push remains")
+        self.plant.push(cover, *push)
+        if self._disturbed != cover:
+            self._end_disturbance()
+        self._disturbed, self._disturbed_until = cover, self._tick + self._push_ticks
 
-    def _end_push(self, cover: str) -> None:
-        self._push_ends.pop(cover, None)
-        self.plant.push(cover, ZERO, ZERO)
+    def _end_disturbance(self) -> None:
+        if self._disturbed:
+            self.plant.push(self._disturbed, ZERO, ZERO)
+            self._disturbed = ""
 
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""

@@ -106,7 +106,7 @@ def test_a_message_without_a_push_ends_those_of_messages_and_not_that_of_the_pro
     hardware = driver()
     none, force = (0.0, 0.0, 0.0), (0.0, 5.0, 0.0)
     hardware.disturb(Wrench("inner_link", force, none))
-    hardware.push("outer_link", force, none)
+    hardware.plant.push("outer_link", force, none)
     assert [load.cover for load in hardware.plant.loads()] == ["inner_link", "outer_link"]
     hardware.disturb(Wrench(BASE, none, none))
     assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
@@ -126,14 +126,16 @@ def test_a_message_is_the_one_push_of_messages_so_that_one_on_another_cover_ends
 def test_a_push_that_nobody_repeats_ends_after_the_age_of_a_command_and_no_other() -> None:
     hardware = driver()
     periods = round(WAM.shared.ages.command / WAM.shared.timing.period)
-    hardware.push("inner_link", (0.0, 5.0, 0.0), (0.0, 0.0, 1.0))
-    for _ in range(periods):
-        hardware.push("outer_link", (0.0, 5.0, 0.0), (0.0, 0.0, 1.0))
-        hardware.advance(0.0)
+    push = (0.0, 5.0, 0.0), (0.0, 0.0, 1.0)
+    hardware.plant.push("inner_link", *push)
+    for repeated in [True] * periods + [False] * periods:
+        if repeated:
+            hardware.disturb(Wrench("outer_link", *push))
         assert len(hardware.plant.loads()) == 2
+        hardware.advance(0.0)
     for _ in range(2):
         hardware.advance(0.0)
-    assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
+    assert [load.cover for load in hardware.plant.loads()] == ["inner_link"]
 
 
 @pytest.mark.parametrize("force", [1e12, 1e300, math.nan])

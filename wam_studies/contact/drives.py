@@ -156,7 +156,7 @@ def _push(run: Simulation, arm: Arm, contacts: Sequence[Touch], time: float) -> 
     near = [touch for touch in contacts if not touch.mass and touch.begin - 0.01 <= time <= touch.end + 0.01]
     for cover in {touch.cover for touch in near}:
         wrench = np.sum([touch.wrench(time, arm.covers) for touch in near if touch.cover == cover], axis=0).tolist()
-        run.driver.push(cover, wrench[:3], wrench[3:])
+        run.driver.plant.push(cover, wrench[:3], wrench[3:])
 
 
 def arriving(recording: DriveRecording, period: float, seed: int) -> Iterator[tuple[int, State, float]]:
