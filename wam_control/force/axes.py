@@ -8,17 +8,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import UNTURNED, Angles, ForceAxes, ForceAxis, PressedForce
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import BASE
-
-Array = NDArray[np.float64]
 
 
 class CommandedAxis(NamedTuple):

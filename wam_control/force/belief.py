@@ -8,15 +8,11 @@ that shakes.  Its size per tolerated error is the doubt of a command.
 import math
 from typing import Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import is_too_slow, yielding
 from wam_control.force.thresholds import FORCE
-
-Array = NDArray[np.float64]
+from wam_description.rigid_body import Array
 
 
 class Errors(NamedTuple):

@@ -5,23 +5,20 @@ from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.advice import Ways
 from wam_control.force.axes import CommandedAxis, Links
 from wam_control.force.belief import UNKNOWN
 from wam_control.force.contact_place import ContactPlace
-from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import Angles, ForceAxes, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.force_measurement import ForceMeasurement
+from wam_control.force.force_measurement import ForceMeasurement, LowPass
 from wam_control.force.force_watch import ForceWatch, MotionWatch
 from wam_control.force.limits import latency
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Covers, Servo, Timing
-
-Array = NDArray[np.float64]
+from wam_description.rigid_body import Array
 
 
 class AxisRun:
@@ -164,7 +161,7 @@ class CommandRun:
     is_moving : whether the arm still moves as it did when the command began.
     delayed : speeds along the axes that are still to come, m/s or rad/s.
     joints : what is reported of a posture, of each joint.
-    feed_forward : of this command.
+    friction : that is fed forward, N m at the joints (n,), filtered.
     search, ways : what would help a refused force: still to be tried, and found.
     """
 
@@ -189,7 +186,7 @@ class CommandRun:
         self.still_sd = still_sd
         self.delayed: deque[list[float]] = deque()
         self.joints = {name: MotionWatch() for name in arm.joints.names}
-        self.feed_forward = FeedForward(arm)
+        self.friction = LowPass()
         self.search: Iterator[Ways] | None = None
         self.ways: Ways = {}
 
@@ -200,7 +197,7 @@ class CommandRun:
                 if (before.frame, other.of) == (self.frame, one.of):
                     one.place, one.anchor, one.wound_up = other.place, other.anchor, other.wound_up
                     one.rising, one._shown = other.rising, other._shown
-                    self.feed_forward = before.feed_forward
+                    self.friction = before.friction
 
     @property
     def is_touching(self) -> bool:

@@ -3,16 +3,13 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_control.force.force_axis import PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import TaskAxis
 from wam_description.arm import Covers
+from wam_description.rigid_body import Array
 from wam_description.signals import BASE, Contact, ForceCommand, Triple
 
-Array = NDArray[np.float64]
 STEEPEST = 0.5  # sine of the lean of a force from the normal of a link, up to which its position is estimated well
 
 

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Servo
 from wam_description.parameters import parameter
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.small_matrices import inverse, length, outer
 from wam_description.transmission_map import TransmissionMap
 
-Array = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 Angles = Sequence[float] | Array  # of the joints (n,), rad
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover

@@ -13,13 +13,13 @@ from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.advice import tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
+from wam_control.force.feed_forward import dry_friction
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -45,12 +45,12 @@ from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, warning
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import BASE, NO_CONTACT, ZERO, Contact, ForceCommand, State, Triple
+from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceInput", "ForceLoop", "ForceLoopParameters", "ForceOutput", "by_seriousness"]
 
-Array = NDArray[np.float64]
 AxisRow = tuple[float, float, float, float, float]  # under TASK_AXIS_COLUMNS
 
 
@@ -126,7 +126,7 @@ class ForceLoop:
     def __init__(
         self, arm: Arm, servo: Servo, parameters: ForceLoopParameters, timing: Timing, command_age: float = math.inf
     ) -> None:
-        self._timing, self._servo, self._body = timing, servo, RigidBody(arm)
+        self._timing, self._servo, self._body, self._map = timing, servo, RigidBody(arm), TransmissionMap.of(arm)
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._measurement = ForceMeasurement(self._body)
         self._pushed = PushedArm(self._body)
@@ -387,8 +387,11 @@ class ForceLoop:
         if velocity is not unlimited:
             limits += self._at_ends(unlimited, velocity)
         fed = self._fed(holds)
-        effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces and not holds else fed.tolist()
-        return velocity, effort, limits
+        if forces and not holds and own.friction_feedforward and not own.is_estimated:
+            countered = dry_friction(self._body.arm, self._map, velocity.tolist())
+            friction = run.friction.step(countered, FORCE.friction_time, dt)
+            fed += own.friction_feedforward * np.array(friction)
+        return velocity, fed.tolist(), limits
 
     def _towards(self, goal: Sequence[float], rate: Sequence[float] | None = None) -> Array:
         """Velocities (n,), rad/s, towards joint angles (n,), rad, that move at a rate (n,), rad/s."""

@@ -16,7 +16,6 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
-from wam_description.topics import FORCE_AXIS
 from wam_description.wiring import Input, Outputs, reaction
 
 
@@ -123,7 +122,7 @@ class ForceLoopNode:
         return frozenset({"external_joint_torques", "contact/hypotheses"} if is_fed_back else ())
 
     def _force_axis(self, out: ForceOutput, stamp: int) -> Outputs:
-        """How well the force is known, at the display rate and where the event has changed."""
+        """How well the force is known, in the order of `FORCE_AXIS`; at the display rate and with another event."""
         event, before = self._loop.event, self._event
         self._event = event
         is_same = event is before or event.subject == before.subject
@@ -135,20 +134,11 @@ class ForceLoopNode:
         if axis is None or place is None:
             return {"force_axis": Table(BASE, ())}
         known = out.known[0]
-        values = {
-            "event": float(event.code.number),
-            "holds": float(event.holds),
-            "doubt": known.doubt,
-            "tolerance": known.tolerance,
-            "force_sd": known.sd,
-            "lever": math.hypot(*axis.lever),
-            "apparent_mass": axis.apparent_mass,
-            "speed_fraction": axis.speed_fraction,
-            "position": place.position,
-            "position_sd": place.position_sd,
-            **known.errors._asdict(),
-        }
-        return {"force_axis": Table(place.cover, (tuple(values[name] for name in FORCE_AXIS),))}
+        row = (
+            *(float(event.code.number), float(event.holds), known.doubt, known.tolerance, *known.errors, known.sd),
+            *(math.hypot(*axis.lever), axis.apparent_mass, axis.speed_fraction, place.position, place.position_sd),
+        )
+        return {"force_axis": Table(place.cover, (row,))}
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""

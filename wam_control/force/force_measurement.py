@@ -5,17 +5,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.belief import WorldTorques
 from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import State
-
-Array = NDArray[np.float64]
 
 
 class LowPass:

@@ -14,9 +14,6 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -24,8 +21,7 @@ from wam_control.force.limits import rise_time
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.event import Code, Event, Value, holding, warning
-
-Array = NDArray[np.float64]
+from wam_description.rigid_body import Array
 
 
 class Lasting:

@@ -3,9 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -13,11 +10,9 @@ from wam_control.force.limits import WorldPush, certain_size, likeliest_link
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import Contact
 from wam_description.small_matrices import length
-
-Array = NDArray[np.float64]
 
 
 class PushedArm:

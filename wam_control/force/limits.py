@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles, ForceAxis
@@ -13,10 +12,9 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.small_matrices import length
 
-Array = NDArray[np.float64]
 Bounds = tuple[list[float], list[float]]
 
 

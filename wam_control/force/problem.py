@@ -12,12 +12,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import quadprog
-from numpy.typing import NDArray
 
 from wam_control.force.thresholds import FORCE
+from wam_description.rigid_body import Array
 from wam_description.small_matrices import inverse, length, outer
 
-Array = NDArray[np.float64]
 RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
 
 
