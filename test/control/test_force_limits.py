@@ -10,15 +10,17 @@ from arms import CONFIGURATION, WAM
 from test_force_belief import BODY, OUTER, OWN, POSES, axis_at
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.held_arm import PushedArm
 from wam_control.force.limits import (
-    WorldPush,
     approach_speed,
     certain_size,
     followed,
     joint_bounds,
+    largest_lever,
     likeliest_link,
     servo_yielding,
 )
+from wam_description.signals import ZERO, Contact
 from wam_description.transmission_map import TransmissionMap
 
 JOINTS, DT = WAM.joints, 0.005
@@ -101,19 +103,20 @@ def test_a_push_is_never_stated_as_larger_than_the_force(cover: int) -> None:
         force = random.normal(size=3)
         force *= 50.0 / np.linalg.norm(force)
         torques = force @ BODY.point_jacobian(q, WAM.covers.names[cover], (far, 0.0, 0.0))
-        push = WorldPush.at(torques, certain_size(torques, sd), likeliest_link(BODY, q, torques))
-        assert 0.0 <= push.least <= 50.0 * (1.0 + 1e-9)
+        least = certain_size(torques, sd) / largest_lever(likeliest_link(BODY, q, torques))
+        assert 0.0 <= least <= 50.0 * (1.0 + 1e-9)
         assert certain_size(0.02 * random.normal(size=4), 0.1 * np.ones(4)) == 0.0, "noise is no push"
 
 
 def test_an_arm_gives_way_to_what_is_above_the_allowed_force_and_does_not_move_against_it() -> None:
-    jacobian = BODY.point_jacobian(POSES[0], OUTER, (0.28, 0.0, 0.0))
-    push = WorldPush.at(np.array([0.0, -40.0, 0.0, 60.0]), math.hypot(40.0, 60.0), jacobian)
-    for part, sense in ((0.5, 1.0), (1.0, 0.0), (2.0, -1.0)):
-        row = push.row(part * push.least, 0.03, 1.5)
-        assert row.along @ push.torques > 0.0, "along the torques of the world"
+    torques, touched = np.array([0.0, -40.0, 0.0, 60.0]), Contact(OUTER, 0.28, ZERO)
+    least = math.hypot(40.0, 60.0) / largest_lever(BODY.point_jacobian(POSES[0], OUTER, (0.28, 0.0, 0.0)))
+    for part, gain, sense in ((0.5, 0.03, 1.0), (1.0, 0.03, 0.0), (2.0, 0.03, -1.0), (0.0, 1e9, 1.0)):
+        given = POSES[0], [], torques, np.zeros(4), touched, 0.0, (part * least, ""), False, False, gain, OWN, DT
+        (row,) = PushedArm(BODY).step(*given)
+        assert row.along @ torques > 0.0, "along the torques of the world"
         assert np.sign(round(row.speed, 12)) == sense
-    assert push.row(0.0, 1e9, 1.5).speed == 1.5
+    assert row.speed == OWN.joint_speed_limit
 
 
 def test_the_link_that_is_pushed_is_the_one_that_explains_the_torques() -> None:

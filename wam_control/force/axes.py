@@ -97,7 +97,7 @@ class TaskAxes:
         in_frame = [sign * np.array(axis.direction) for axis, sign in zip(task.axes, signs, strict=True)]
         directions = [rotation.dot(one) for one in in_frame]
         pressed = [
-            PressedForce(place.cover, place.position, place.position_sd, direction, _size(axis))
+            place.pressed(direction, _size(axis))
             for axis, place, direction in zip(task.axes, places, directions, strict=True)
         ]
         is_alone = len(pressed) == 1

@@ -39,7 +39,7 @@ from wam_control.force.limits import (
     servo_yielding,
 )
 from wam_control.force.problem import VelocityRow, solve
-from wam_control.force.stability_guard import GuardAssessment, Guarded
+from wam_control.force.stability_guard import GuardAssessment
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
@@ -353,12 +353,14 @@ class ForceLoop:
         dt: float,
     ) -> tuple[Array, list[float], list[Event]]:
         """Joint velocities and torques (n,), and what limits them."""
-        own, run = self.parameters, self._run
+        own, run, sensing, supervision = self.parameters, self._run, self._axes.forces, self._supervision
         axes = [one.now for one in run.axes]
         holds = any(event.holds for event in found)
-        factor = self._supervision.factor(lambda: self._guarded(axes, contact), dt) if axes else 1.0
+        factor = (
+            supervision.factor(lambda: guarded(self._q, axes, contact, sensing, own, supervision), dt) if axes else 1.0
+        )
         is_watched = bool(axes) and own.is_estimated and not run.is_touching
-        is_watching = is_watched and run.shaking.is_watching(self._pose, self._axes.forces, self._servo, dt)
+        is_watching = is_watched and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
         torque_sd = self._measurement.torques.sd
         if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
             run.still_sd = torque_sd
@@ -368,8 +370,8 @@ class ForceLoop:
         if holds:
             run.held_at = self._hold_at(found, contact) if run.held_at is None else run.held_at
             # what it may hit on its way back after a push
-            inertia = self._axes.forces.moved_inertia(self._pose)
-            wanted = calm(self._towards(run.held_at.tolist()), inertia, own.impact_energy(allowed))
+            wanted = self._towards(run.held_at.tolist())
+            wanted = calm(wanted, sensing.moved_inertia(self._pose), own.impact_energy(allowed))
         else:
             run.held_at = None
             rows = self._rows(factor, is_watching, dt) if axes else []
@@ -499,10 +501,6 @@ class ForceLoop:
         return self._pushed.step(
             self._pose, forces, now, torques.sd, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt
         )
-
-    def _guarded(self, axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
-        """What is controlled now, for the guard."""
-        return guarded(self._q, axes, contact, self._axes.forces, self.parameters, self._supervision)
 
     def _at_ends(self, unlimited: Array, velocity: Array) -> list[Event]:
         """The joints that do not move on at their ends."""

@@ -222,23 +222,26 @@ class ForceWatch:
             self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
         is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
         self._is_decided = self._is_decided or (is_there and not self._is_refused)
-        part, source = known.errors.cause, _source(own, self._is_dithered)
-        if part == "place" and place is not None:
-            source = "pinned" if place.is_pinned else "estimated"
-        values: dict[str, Value] = {
-            "error": known.errors.size, "part": part, "source": source, "desired": axis.desired,
-            "allowed": known.tolerance, "unit": _unit(axis), "cover": place.cover if place else axis.of.name,
-            "position": place.position if place else math.nan,
-        }  # fmt: skip
         if self._is_refused:
-            return [holding(Code.REFUSED, "error", **values)]
+            return [holding(Code.REFUSED, "error", **self._wrong(known.errors.size, axis, known, own))]
         # what is off already leaves less of the tolerance to what is not known; what is off by all of it is not reached
         off = error if abs(error) <= known.tolerance else 0.0
-        values["error"] = error = math.hypot(known.errors.size, off)
+        error = math.hypot(known.errors.size, off)
         is_doubtful = error > known.tolerance and self.touch.is_there
         lasting = own.limits.settling_time
         is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
-        return [warning(Code.REFUSED, "uncertain", **values)] if is_on else []
+        return [warning(Code.REFUSED, "uncertain", **self._wrong(error, axis, known, own))] if is_on else []
+
+    def _wrong(self, error: float, axis: CommandedAxis, known: Belief, own: ForceLoopParameters) -> dict[str, Value]:
+        """By how much a force may be wrong, N, and why."""
+        part, source, place = known.errors.cause, _source(own, self._is_dithered), axis.place
+        if part == "place" and place is not None:
+            source = "pinned" if place.is_pinned else "estimated"
+        return {
+            "error": error, "part": part, "source": source, "desired": axis.desired,
+            "allowed": known.tolerance, "unit": _unit(axis), "cover": place.cover if place else axis.of.name,
+            "position": place.position if place else math.nan,
+        }  # fmt: skip
 
     def _contradicted(self, axis: CommandedAxis, seen: Seen, dt: float) -> Event | None:
         """Another link is touched."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import WorldPush, certain_size, likeliest_link
+from wam_control.force.limits import certain_size, largest_lever, likeliest_link
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
@@ -80,8 +80,8 @@ class PushedArm:
         jacobians = [self._jacobian(q, axes, contact)] if certain else []
         if certain and chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
             jacobians.append(likeliest_link(self._body, q, torques))
-        pushes = [WorldPush.at(torques, certain, jacobian) for jacobian in jacobians]
-        hardest = max([push.least for push in pushes], default=0.0)
+        levers = [largest_lever(jacobian) for jacobian in jacobians]
+        hardest = certain / min(levers) if certain else 0.0  # the least force that explains what is certain
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
         allowed = max(bound[0], self._allowed * (1.0 - fade))
@@ -93,14 +93,16 @@ class PushedArm:
                 self.event = warning(Code.PUSHED, "pushed", **values)
         elif self._since > FORCE.lasting:
             self.event = None
-        if not pushes:
+        if not certain:
             return []
         tool = self._body.tool_pose(q).position
         if is_new or self._from is None:
             self._from = tool
         if length(tool - self._from) > own.limits.free_travel:
             return []
-        return [push.row(allowed, gain, own.joint_speed_limit) for push in pushes]
+        along, fastest = torques / length(torques), own.joint_speed_limit
+        # no faster against it than a force law allows up to this force, and above it away from it
+        return [VelocityRow(along, min(gain * (certain / lever - allowed) / lever, fastest)) for lever in levers]
 
     def _jacobian(self, q: Angles, axes: Sequence[CommandedAxis], contact: Contact) -> Array:
         """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""

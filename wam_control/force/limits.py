@@ -2,14 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles, ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
 from wam_description.rigid_body import Array, RigidBody
@@ -127,30 +125,9 @@ def certain_size(torques: Array, torque_sd: Array) -> float:
     return max(length(torques) - FORCE.certain * length(torque_sd), 0.0)
 
 
-class WorldPush(NamedTuple):
-    """What pushes the arm.
-
-    Attributes
-    ----------
-    least : smallest force, N, that explains the torques, less what is uncertain of them.
-    torques : of it on the joints (n,), N m.
-    lever : largest torque per force, m.
-    """
-
-    least: float
-    torques: Array
-    lever: float
-
-    @classmethod
-    def at(cls, torques: Array, size: float, jacobian: Array) -> "WorldPush":
-        """What pushes with these torques (n,), N m, of this certain size at a point with this Jacobian (3, n)."""
-        lever = max(math.sqrt(np.linalg.eigvalsh(jacobian.dot(jacobian.T))[-1]), FORCE.least_lever)
-        return cls(size / lever, torques, lever)
-
-    def row(self, allowed: float, gain: float, fastest: float) -> VelocityRow:
-        """No faster against it than a force law, m/s/N, allows up to this force, N; above it away from it."""
-        along = self.torques / length(self.torques)
-        return VelocityRow(along, min(gain * (self.least - allowed) / self.lever, fastest))
+def largest_lever(jacobian: Array) -> float:
+    """Largest torque on the joints per force, m, at a point with this Jacobian (3, n)."""
+    return max(math.sqrt(np.linalg.eigvalsh(jacobian.dot(jacobian.T))[-1]), FORCE.least_lever)
 
 
 def likeliest_link(body: RigidBody, q: Angles, torques: Array) -> Array:
