@@ -84,13 +84,12 @@ def requirement(topic: Topic, shared: Shared, arrays: str) -> Callable[[Any], An
     """What a value of a topic must fulfil, as a function that refuses others; parameters as of `decoder`."""
     if topic.type == TRAJECTORY:  # its reader has looked at it
         return lambda value: value
-    defect_of = defect_finder(topic, shared.arm, arrays)
-    masked = mask(arrays) if topic.type == JOINT_STATE else None
+    defect_of, masked = defect_finder(topic, shared.arm, arrays), mask(arrays)
 
     def required(value: Any) -> Any:
         if defect := defect_of(value):
             raise Refused(defect)
-        return masked(value) if masked else value
+        return masked(value)
 
     return required
 

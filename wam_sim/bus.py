@@ -161,8 +161,8 @@ class _Outlets(dict[str, _Outlet]):
 
 def _inlet(feed: Feed, topic: str, is_masked: bool) -> Inlet:
     """Where a reaction takes a topic; masked, it gets of a JointState only what it declares."""
-    inlet, masked = feed.synchroniser.inlet(topic), mask(feed.arrays) if is_masked else None
-    return inlet if masked is None else lambda stamp, value: inlet(stamp, masked(value))
+    inlet, masked = feed.synchroniser.inlet(topic), mask(feed.arrays)
+    return (lambda stamp, value: inlet(stamp, masked(value))) if is_masked else inlet
 
 
 def _checked(publish: _Outlet, check: Check | None) -> _Outlet:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 
+from wam_control.velocity.gravity_node import GravityNode
 from wam_description.arm import Shared
 from wam_description.event import Level
 from wam_description.parameters import Nothing, ParameterError, parameter
@@ -64,6 +65,21 @@ class Unread(Raising):
     @reaction(Input("joint_states", "velocity"), outputs=("share",))
     def step(self, inputs: Inputs) -> Outputs:
         return {"share": State([], [], [math.nan] * 4)}
+
+
+class Changing(GravityNode):
+    @reaction(Input("joint_states", "position"), outputs=("gravity_effort",))
+    def step(self, inputs: Inputs) -> Outputs:
+        outputs = super().step(inputs)
+        inputs["joint_states"].position[:] = [9.0] * 4
+        return outputs
+
+
+def test_a_node_that_changes_its_input_changes_that_of_no_other(arm: RunningArm) -> None:
+    arm.start(gravity=Changing)
+    arm.enable()
+    arm.run(0.2)
+    assert np.abs(arm.truth.q - arm.recorded["joint_states"].position[0]).max() < 0.01
 
 
 def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningArm) -> None:
