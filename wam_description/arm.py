@@ -142,7 +142,7 @@ class Arm:
                 apart = max(0.0, short) if is_on_axis else 0.0  # a tool may be beyond the link or next to it
             require(
                 apart <= MODEL.same_point,
-                f"{cover.name}: by arm.covers.length it ends at {_point(ends)} m in the frame of {cover.link}, but "
+                f"{cover.name} ends at {_point(ends)} m in the frame of {cover.link}, by arm.covers.length, but "
                 + where
                 + coupled.format(here),
             )

@@ -97,7 +97,7 @@ REQUIREMENTS: Final = {
         "keep the first reason until reset_fault, which never enables",
     ),
     "disable": Requirement(
-        "on enable with false, stops the current at once and brakes",
+        "if enable is called with false, stops the current at once and brakes",
         "put on the brakes in the answer itself",
     ),
     "estop": Requirement(

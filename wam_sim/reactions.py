@@ -210,7 +210,7 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
         longest, others = max(alike, key=lambda one: one.end - one.begin), len(alike) - 1
         verb = REFUSAL if longest.holds else IN_DOUBT if kind is Code.REFUSED else "reported"
         verb += f" ({kind.words})" * (kind is not Code.REFUSED)
-        again = f" and {others} more time{'s' * (others > 1)}" if others else ""
+        again = "" if not others else " and once more" if others == 1 else f" and {others} more times"
         begin, end = ((stamp - zero) / 1e9 for stamp in (longest.begin, longest.end))
         lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {longest.reason}")
     return lines

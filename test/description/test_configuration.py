@@ -229,7 +229,7 @@ IN_PLACE = "a value that you set, section '/**': "
         ({"nodes": []}, f"{IN_PLACE}parameter 'nodes' is empty; list the nodes to start, for example"),
         ({"timing.real_time_factor": 9e-4}, "timing.real_time_factor is 0.0009; allowed: 0.001 to 100, or 0 for"),
         ({"timing.outer_divisor": 36, "ages.feedback": 0.035}, "ages.feedback is 0.035 s, less than an outer period"),
-        ({"arm.tool": [0.3, 0.0, 0.0]}, "by arm.covers.length it ends at (0.4064, 0, 0) m"),
+        ({"arm.tool": [0.3, 0.0, 0.0]}, "outer_link ends at (0.4064, 0, 0) m"),
         ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
         ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
         ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "arm.covers.start and end reach up to 0.5 m"),

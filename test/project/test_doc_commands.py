@@ -23,7 +23,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-import numpy as np
 import pytest
 from conftest import LONG
 
@@ -292,9 +291,8 @@ def test_the_client_of_the_documentation_presses_with_the_commanded_force(tmp_pa
                 reader.stop()  # what follows needs no stack
     assert [commanded for commanded, _ in pressed] == [5.0, 10.0]
     for commanded, measured in pressed:
+        # lockstep does not wait for a client: on a busy machine its commands come late
         assert measured == pytest.approx(commanded, rel=0.2)
-    # lockstep does not wait for a client: on a busy machine its commands come late
-    assert np.array(presses(OWN_NODE.read_text(encoding="utf-8"))) == pytest.approx(np.array(pressed), rel=0.2)
 
 
 def presses(printed: str) -> list[tuple[float, float]]:

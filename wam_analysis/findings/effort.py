@@ -54,7 +54,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not sentences:
-        why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
+        why = "The friction of the joints cannot be identified: no recorded effort shows friction."
         return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
     doubts += [RECORD] * bool(doubts)
     assumed = (

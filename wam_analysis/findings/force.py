@@ -17,7 +17,7 @@ from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
-WHOSE = "Forces are along the command: measured by the force loop, estimated by the contact estimator."
+WHOSE = "Each force is the part along the command. The force loop measures; the contact estimator estimates."
 NOT_APPLIED, ELSE = "The arm held its position instead", "Reported by the force loop"
 STICTION = (
     "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"

@@ -75,7 +75,7 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
         COMMANDED_CYCLE: ", as it was commanded",
         HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion, "
         "which is not followed linearly",
-        UNKNOWN: "; its command is not known: name its topic with --command; in a table, its column has to be "
+        UNKNOWN: "; its command is not known: give its topic with --command, or in a CSV file name its column "
         "command.position.JOINT",
     }
     return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."
@@ -101,9 +101,9 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
-    span = f"Vibrations below {least} cannot be found: the longest part without a gap is too short."
-    ranges = ", ".join(f"{label} varied by {shown(size, unit)}" for unit, (size, label) in varied.items())
-    silent = [] if findings else [f"No vibration above {least}; {ranges}."]
+    span = f"To find vibrations below {least}, record a longer part without a gap."
+    ranges = ", ".join(f"{shown(size, unit)} ({label})" for unit, (size, label) in varied.items())
+    silent = [] if findings else [f"No vibration was found above {least}. Largest change of a value: {ranges}."]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 
