@@ -118,7 +118,7 @@ class _Kept:
     def __init__(self, row: "_Row") -> None:
         self._row = row
         self._blocks: list[tuple[str, Struct, list[bytes]]] = []
-        self._count, self._frame = 0, ""
+        self._count, self._frame = -1, ""  # of the present block, none so far
 
     def add(self, stamp: int, value: Any) -> None:
         """Keep the numbers of a message."""
@@ -135,7 +135,7 @@ class _Kept:
 
     def taken(self) -> list[TopicValue]:
         """The messages since the last call."""
-        blocks, self._blocks, self._count = self._blocks, [], 0
+        blocks, self._blocks, self._count = self._blocks, [], -1
         return [
             TopicValue(stamp, tuple(values), frame)
             for frame, layout, messages in blocks
