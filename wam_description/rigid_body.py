@@ -159,7 +159,7 @@ class RigidBody:
         kg m^2.  The torques are linear in them (Atkeson, An & Hollerbach 1986).
         """
         args = (_vector(q), _vector(qd), _vector(qdd))
-        return np.array(pin.computeJointTorqueRegressor(self._model, self._data, *args)).reshape(self._model.nv, -1)
+        return pin.computeJointTorqueRegressor(self._model, self._data, *args).reshape(self._model.nv, -1)
 
     def _known(self, cover: str) -> int:
         if cover not in self._frame:

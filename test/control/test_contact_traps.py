@@ -158,6 +158,6 @@ def test_friction_after_a_reversal_is_uncertain_for_as_long_as_presliding_may_la
     ahead = np.full(8, 2.0)
     for keep, is_uncertain in ((0.97, True), (0.0, False)):
         shafts = ShaftFriction(WAM, OWN, None)
-        before = [shafts.of(ahead, keep, DT).sliding for _ in range(2000)][-1]
+        before = [shafts.of(ahead, keep, DT).by_distance for _ in range(2000)][-1]
         assert before == pytest.approx(np.ones_like(before), abs=1e-3)
-        assert (np.ptp(shafts.of(-0.05 * ahead, keep, 0.05).sliding[0]) > 1.0) == is_uncertain
+        assert (np.ptp(shafts.of(-0.05 * ahead, keep, 0.05).by_distance[0]) > 1.0) == is_uncertain

@@ -26,8 +26,8 @@ def fitted(counts: int, seconds: float = 1.5, kept: float = 1.0) -> tuple[Veloci
         since = 0.0
         if found is not None and time > 0.5:
             at = time - fit.delay
-            errors.append(np.array(found.state.velocity) - 3.0 * swing * np.cos(swing * at))
-            np.testing.assert_allclose(found.state.position, 3.0 * np.sin(swing * at), atol=max(2.0 * step, 1e-3))
+            errors.append(np.array(found[0].velocity) - 3.0 * swing * np.cos(swing * at))
+            np.testing.assert_allclose(found[0].position, 3.0 * np.sin(swing * at), atol=max(2.0 * step, 1e-3))
     return fit, np.array(errors)
 
 

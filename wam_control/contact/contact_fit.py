@@ -248,7 +248,7 @@ class ContactFit:
     def _log_density(self, links: Sequence[_Link]) -> list[list[float]]:
         """`_Link.log_density` of all pieces of the grid."""
         terms = np.array([link.terms for link in links]).reshape(-1, 5, 3) @ self._powers
-        n11, n12, n22, c1, c2 = terms.transpose(1, 0, 2)
+        n11, n12, n22, c1, c2 = terms.transpose(1, 0, 2).copy()  # numpy takes rows that lie apart more slowly
         determinant = n11 * n22 - n12 * n12
         explained = (n22 * c1 * c1 - 2.0 * n12 * c1 * c2 + n11 * c2 * c2) / determinant
         found: list[list[float]] = (0.5 * (explained - np.log(determinant))).tolist()
@@ -309,10 +309,10 @@ class ContactFit:
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
         """What the pieces, the most probable first, are of each link, and the sum of their weights."""
         top = pieces[0][0]
-        weighted = [(math.exp(value - top) * width, x, width, i, is_along) for value, x, width, i, is_along in pieces]
-        total, passed = sum([each[0] for each in weighted]), 0.0
+        weights = [math.exp(value - top) * width for value, _, width, _, _ in pieces]
+        total, passed = sum(weights), 0.0
         enough, parts = CONTACT.reported_probability * total, [_Part(*ends) for ends in self._ends]
-        for weight, x, width, i, is_along in weighted:
+        for weight, (_, x, width, i, is_along) in zip(weights, pieces):  # noqa: B905
             part = parts[i]
             part.mass += weight
             part.first += weight * x

@@ -128,7 +128,7 @@ class ContactFusion:
         found: Array = (
             past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)
         ) / self._widening
-        if np.abs(found - found.transpose(0, 2, 1)).max() > CONTACT.rounding:
+        if (found - found.transpose(0, 2, 1)).max() > CONTACT.rounding:
             self.reset()
             return None
         self.count = 1 + past.moments
@@ -164,8 +164,8 @@ class ContactFusion:
     def _of(self, moments: list[_Seen], now: Torques, guess: Array) -> _Past:
         n, last = len(now.residual), moments[-1].torques
         effects = np.concatenate([moment.torques.effects for moment in moments])
-        shared = effects @ last.covariance
-        common = shared @ effects.T
+        shared = effects.dot(last.covariance)
+        common = shared.dot(effects.T)
         places, chances = guess[:, 0], np.sqrt(guess[:, 1])
         found, count = len(places), len(moments)
         rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
@@ -193,7 +193,7 @@ class ContactFusion:
         for j in range(count):
             of = slice(n * j, n * j + n)
             side = turned[:, :, j].reshape(-1, n)
-            covariance[of, of] += side.T @ side
+            covariance[of, of] += side.T.dot(side)
         per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
         link = int(chances.argmax())
         unknown = np.concatenate(
@@ -205,20 +205,20 @@ class ContactFusion:
         )
         slides = probability_of_slide(
             np.concatenate([moment.torques.residual for moment in moments]),
-            self._widening * (covariance + unknown.T @ unknown),
+            self._widening * (covariance + unknown.T.dot(unknown)),
             CONTACT.slide_speed * (per_metre[link] * elapsed[:, None]).reshape(-1),
         )
         self._speed = _speed(slides)
         far = np.multiply.outer(chances, moved + self._speed * elapsed)
         slips = (per_metre * far[:, :, None]).reshape(found, -1)
-        covariance += slips.T @ slips
+        covariance += slips.T.dot(slips)
         rows = rows.reshape(len(rows), 7, count * n)
         precision = inverse(covariance)
         weighted_rows = precision @ rows.transpose(0, 2, 1)
         return _Past(
             gram=rows @ weighted_rows,
             predicts=shared.T @ weighted_rows,
-            explains=shared.T @ precision @ shared,
+            explains=shared.T.dot(precision).dot(shared),
             expected=float((precision * common).sum()),
             last=last,
             slope=slope,
@@ -235,7 +235,7 @@ def _sides(rows: Array, places: Array) -> tuple[Array, Array]:
 
 def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
     """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
-    weighted = np.linalg.solve(covariance + slips.T @ slips, before)
+    weighted = np.linalg.solve(covariance + slips.T.dot(slips), before)
     return float(torques.dot(weighted)) / float(before.dot(weighted))
 
 

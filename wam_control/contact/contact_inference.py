@@ -147,7 +147,7 @@ class ContactInference:
             one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
         given, links = self._parameters, len(self._covers)
-        if (size := float(precision.trace())) > (10.0 * CONTACT.smallest_sd) ** -2:
+        if (size := sum(precision.diagonal().tolist())) > (10.0 * CONTACT.smallest_sd) ** -2:
             fusion = None  # together they would be as exact
         if size > CONTACT.smallest_sd**-2:
             precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(precision)))

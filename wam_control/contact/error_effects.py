@@ -158,6 +158,6 @@ class ErrorEffects:
         lasting = self._through * np.sqrt(variance)
         less = self._times[0] / time  # a faster filter averages less of what is noise
         variance[:n] += less * (given.motor_torque_sd**2 + np.square(given.motor_torque_fraction * modelled))
-        momentum = inertia.dot(self._from_motors * (np.array(self._side.velocity_sd) / time))
+        momentum = inertia.dot(self._from_motors * (np.array(self._side.velocity.sd) / time))
         rest = (self._through * variance).dot(self._through.T) + momentum.dot(momentum.T)
         return Observation(residual, effects, rest, less * moving[:n], motion.pose, lasting)

@@ -129,10 +129,10 @@ class ModelErrors:
 
     def _take(self, innovation: Array, covariance: Array, seen: Observation) -> None:
         """Learn from an innovation, (n,), N m, by its covariance, (n, n)."""
-        gain_torques = self.covariance @ seen.effects.T
+        gain_torques = self.covariance.dot(seen.effects.T)
         gain = np.linalg.solve(covariance, gain_torques.T).T
-        self.errors = self.errors + gain @ innovation
-        corrected = self.covariance - gain @ gain_torques.T
+        self.errors = self.errors + gain.dot(innovation)
+        corrected = self.covariance - gain.dot(gain_torques.T)
         self.covariance = 0.5 * (corrected + corrected.T)
         self.beyond = self._beyond()
 
@@ -199,13 +199,13 @@ class ModelErrors:
         squared = float(innovation.dot(np.linalg.solve(covariance, innovation))) / len(innovation)
         self.size = min(max(self.size + rate * (CONTACT.margin * squared - self.size), 1.0), CONTACT.largest_size)
         rate = span / CONTACT.noise_time
-        at_motors = self._to_motors @ innovation
+        at_motors = self._to_motors.dot(innovation)
         stated = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors)
         # by Fisher's scoring: what is uncertain for another reason, as the friction of a slow shaft, shows no noise
         share = np.minimum(1.0, (self.noise + self._least_noise) / stated)
         excess = at_motors * at_motors - stated
         self.noise = np.maximum(0.0, self.noise + rate * seen.moving * share * share * excess)
-        rest = covariance - seen.effects @ (self.covariance @ seen.effects.T)
+        rest = covariance - seen.effects.dot(self.covariance.dot(seen.effects.T))
         self._take(innovation, covariance + (CONTACT.correlated - 1.0) * rest, seen)
 
     def _beyond(self) -> list[str]:

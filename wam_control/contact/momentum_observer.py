@@ -6,7 +6,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 import math
 from collections.abc import Sequence
 from operator import sub
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,7 @@ class MomentumObserver:
         """Forget all samples; the moment before them."""
         n = self._n
         self._filters = self._filters.empty_copy()
-        self._last = _Sample([0.0] * n, [0.0] * n, [], np.zeros((n, n)), [], [])
+        self._last = _Sample([0.0] * n, [0.0] * n, [], np.zeros((n, n)), [], [], None)
         self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
@@ -165,10 +165,7 @@ class MomentumObserver:
             return True
         sample = self._side.take(state, dt + self._gap)
         self._gap = 0.0
-        if sample is None:
-            return True
-        q, qd, tau, friction, signals, span = sample
-        return self._update(q, qd, tau, friction, signals, span)
+        return sample is None or self._update(*sample)
 
     def _update(
         self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, dt: float
@@ -282,7 +279,7 @@ def _unexplained(
     return [(now - then) / span - 0.5 * (one + other) for now, then, one, other in each]
 
 
-class _Sample:
+class _Sample(NamedTuple):
     """The last sample that was taken.
 
     Attributes
@@ -295,18 +292,13 @@ class _Sample:
     links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
-    def __init__(
-        self,
-        q: list[float],
-        qd: list[float],
-        momentum: list[float],
-        inertia: Array,
-        known: list[float],
-        bias: list[float],
-        links: LinkMotion | None = None,
-    ) -> None:
-        self.q, self.qd, self.momentum, self.inertia, self.known, self.bias = q, qd, momentum, inertia, known, bias
-        self.links = links
+    q: list[float]
+    qd: list[float]
+    momentum: list[float]
+    inertia: Array
+    known: list[float]
+    bias: list[float]
+    links: LinkMotion | None
 
 
 class _Filters:
@@ -348,7 +340,7 @@ class _Filters:
                 keep = [[math.exp(-span / time)] for time in self.times]
                 self._span, self._keeps = span, np.repeat(keep, len(present), axis=1)
                 self._takes = 1.0 - self._keeps
-            self._values = self._keeps * before + self._takes * present
+            self._values = self._keeps * before + self._takes * present[None]
             if span > self.times[0]:  # continue from here
                 self._values[:, : 5 * n] = before[:, : 5 * n]
         if self.cycle:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
-from wam_control.contact.shaft_friction import EQUAL, ShaftFriction
+from wam_control.contact.shaft_friction import ShaftFriction
 from wam_control.contact.thresholds import CONTACT
 from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
@@ -62,6 +62,7 @@ class MotorSide:
     Attributes
     ----------
     map : between motors and joints.
+    velocity : of the motors.
     is_identified : whether the model is that of a recording.
     friction : of motors, then joints.
     rotors, pulleys : (n, n), their inertia at the joints, kg m^2.
@@ -74,7 +75,7 @@ class MotorSide:
         self._stiffness = self.map.at_joints([circuit.stiffness for circuit in arm.circuits])
         self.is_identified = model is not None and model.is_identified
         self.friction = ShaftFriction(arm, parameters, model)
-        self._velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
+        self.velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
         self._parameters, self._has_dither = parameters, has_dither
         self._torque: Array | None = None
 
@@ -82,16 +83,11 @@ class MotorSide:
         """Forget all samples."""
         self._torque = None
         self.friction.reset()
-        self._velocity.reset()
-
-    @property
-    def velocity_sd(self) -> list[float]:
-        """Standard deviations of the motors' velocities, (n,), rad/s."""
-        return self._velocity.sd
+        self.velocity.reset()
 
     def expect(self) -> None:
         """Let the friction know how certain the velocities are."""
-        sd = np.array(self._velocity.sd)
+        sd = np.array(self.velocity.sd)
         self.friction.expect(np.concatenate((sd, np.sqrt(self._squared.dot(sd * sd)))))
 
     def carries_nothing(self, state: State) -> bool:
@@ -100,8 +96,33 @@ class MotorSide:
 
     def take(self, state: State, dt: float) -> JointSample | None:
         """Take a state of the motors `dt` seconds after the one before; None while velocities are not known."""
-        fitted = self._velocity.take(state, dt)
-        return None if fitted is None else self._sample(fitted.state, fitted.dt)
+        fitted = self.velocity.take(state, dt)
+        if fitted is None:
+            return None
+        (theta, thetad, tau_motor), dt = fitted
+        q, qd = self.map.joint_positions(theta), self.map.joint_velocities(thetad)
+        # with dither a shaft stops at both ends of each swing, held there by the external torque
+        keep = 0.0 if self._has_dither else math.exp(-dt / self._parameters.friction_memory)
+        motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)
+        at_shafts: list[float] = motion.friction.tolist()
+        through = self.map.joint_torques(at_shafts[:n])
+        friction = [a + b for a, b in zip(through, at_shafts[n:], strict=True)]
+        tau = self.map.joint_torques(tau_motor)
+        transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*at_shafts[:n], *through], strict=True)]
+        torque = np.array(tau_motor)
+        change = torque - (torque if self._torque is None else self._torque)
+        signals = np.concatenate(
+            (
+                motion.by_distance.ravel(),
+                np.abs(motion.sliding),
+                motion.resting,
+                motion.slow,
+                np.abs(transmitted) * motion.sliding,
+                change / dt,
+            )
+        )
+        self._torque = torque
+        return JointSample(q, qd, tau, friction, signals, dt)
 
     def links(self, inertia: Array, driven: Array, before: LinkMotion | None, dt: float) -> LinkMotion:
         """Motion of the links, `dt` seconds after the one before, in an implicit step.
@@ -119,29 +140,3 @@ class MotorSide:
         velocity = np.linalg.solve(inertia + held, given + held.dot(driven))
         momentum = inertia.dot(velocity)
         return LinkMotion(velocity, momentum, before.torque + (momentum - given) / lasts)
-
-    def _sample(self, state: State, dt: float) -> JointSample:
-        theta, thetad, tau_motor = state
-        q, qd = self.map.joint_positions(theta), self.map.joint_velocities(thetad)
-        # with dither a shaft stops at both ends of each swing, held there by the external torque
-        keep = 0.0 if self._has_dither else math.exp(-dt / self._parameters.friction_memory)
-        motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)
-        at_shafts: list[float] = motion.friction.tolist()
-        through = self.map.joint_torques(at_shafts[:n])
-        friction = [a + b for a, b in zip(through, at_shafts[n:], strict=True)]
-        tau = self.map.joint_torques(tau_motor)
-        transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*at_shafts[:n], *through], strict=True)]
-        sliding, torque = motion.sliding.dot(EQUAL), np.array(tau_motor)
-        change = torque - (torque if self._torque is None else self._torque)
-        signals = np.concatenate(
-            (
-                motion.sliding.ravel(),
-                np.abs(sliding),
-                motion.resting,
-                motion.slow,
-                np.abs(transmitted) * sliding,
-                change / dt,
-            )
-        )
-        self._torque = torque
-        return JointSample(q, qd, tau, friction, signals, dt)

@@ -30,12 +30,14 @@ class ShaftMotion(NamedTuple):
     Attributes
     ----------
     friction : (n,), N m, against the motion.
-    sliding : (n, k), signed fraction of Coulomb friction that acts, for each presliding distance.
+    by_distance : (n, k), signed fraction of Coulomb friction that acts, for each presliding distance.
+    sliding : (n,), its mean.
     resting : (n,), how far the friction of each shaft is that of one long at rest, 0..1.
     slow : (n,), fraction of `shape_uncertainty` that counts.
     """
 
     friction: Array
+    by_distance: Array
     sliding: Array
     resting: Array
     slow: Array
@@ -76,6 +78,8 @@ class ShaftFriction:
         self._rise = is_identified * (self.static - self.dynamic)
         self._per_distance = np.outer(1.0 / self._rest_velocity, np.exp(-LOG_DISTANCES))
         self._rest = self._rest_velocity
+        # numpy takes arrays of one shape several times faster than it broadcasts them
+        self._each = np.arange(2 * count).repeat(len(EQUAL)).reshape(-1, len(EQUAL))
         self.reset()
 
     def reset(self) -> None:
@@ -92,20 +96,22 @@ class ShaftFriction:
 
         `keep` is the decay of the memory of a shaft at rest in it, 0 for none: with a dither.
         """
-        speed = np.abs(velocity)
+        speed, each = np.abs(velocity), self._each
         moving = np.minimum(1.0, speed / self._rest)
-        remembered = (1.0 - (1.0 - keep) * (1.0 - moving))[:, None]
-        left = np.exp((-dt * speed)[:, None] * self._per_distance)
-        way = np.sign(velocity)[:, None]
+        remembered = (1.0 - (1.0 - keep) * (1.0 - moving))[each]
+        left = np.exp((-dt * speed)[each] * self._per_distance)
+        way = np.sign(velocity)[each]
         if not keep:  # a dither swings a shaft beyond any presliding
-            left, way = np.zeros_like(left), moving[:, None] * way
+            left, way = np.zeros_like(left), moving[each] * way
         self._sliding = way + (remembered * self._sliding - way) * left
-        self._resting = np.maximum(left * self._resting, (1.0 - moving * moving)[:, None])
+        self._resting = np.maximum(left * self._resting, (1.0 - moving * moving)[each])
+        sliding = self._sliding.dot(EQUAL)
         turned = velocity / self._stribeck
         level = self.dynamic + self._rise * np.exp(-turned * turned)
         return ShaftMotion(
-            level * self._sliding.dot(EQUAL) + self._viscous * velocity,
+            level * sliding + self._viscous * velocity,
             self._sliding,
+            sliding,
             np.sqrt((self._resting * self._resting).dot(EQUAL)),
             moving * np.exp(-speed / self._slow),
         )

@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,13 +9,6 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.signals import State
 
 THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third difference, of variance 1 + 9 + 9 + 1
-
-
-class FittedState(NamedTuple):
-    """State in the middle of the window; the state before is `dt` seconds older."""
-
-    state: State
-    dt: float
 
 
 class VelocityFit:
@@ -48,15 +40,18 @@ class VelocityFit:
         """Standard deviation of the velocity of each shaft, rad/s."""
         return [self._scale * mean for mean in self._third]
 
-    def take(self, state: State, dt: float) -> FittedState | None:
-        """Take a sample `dt` seconds after the last; None while the window fills or grows."""
+    def take(self, state: State, dt: float) -> tuple[State, float] | None:
+        """Take a sample `dt` seconds after the last; None while the window fills or grows.
+
+        Returns the state in the middle of the window, and by how many seconds the state before it is older.
+        """
         samples = self._samples
         self._time += dt
         samples.append((self._time, state))
         self._follow(dt)
         half = CONTACT.half_windows[self._choice]
         if half == 0:
-            return FittedState(state, dt)
+            return state, dt
         if len(samples) <= 2 * half:
             return None
         window = list(samples)[-2 * half - 1 :]
@@ -68,7 +63,7 @@ class VelocityFit:
         times -= middle
         velocity = times @ (angles - angles[half]) / (times @ times)  # of a shaft at rest exactly zero
         fitted = State(angles.mean(axis=0).tolist(), velocity.tolist(), window[half][1].effort)
-        return FittedState(fitted, dt if math.isnan(before) else middle - before)
+        return fitted, dt if math.isnan(before) else middle - before
 
     def _follow(self, dt: float) -> None:
         """Follow the error of the angles, and take a longer window where it calls for one."""
