@@ -12,8 +12,7 @@ from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.event import Value, fault
 from wam_description.mismatch import ModelMismatch, true_arm
-from wam_description.mjcf import rotation_xyz
-from wam_description.parameters import lengths, parameter, require, rows
+from wam_description.parameters import lengths, parameter
 from wam_description.signals import BASE, NO_LOAD, ZERO, Answer, Load, Point, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
@@ -74,25 +73,6 @@ class DriverSample(NamedTuple):
     actual: list[float]
 
 
-def _require_springs(arm: Arm, world: World) -> None:
-    """Refuse a spring on a link without a cover, or beyond the ends of it: no message could give its force."""
-    links = dict(zip(arm.joints.names, arm.links.names, strict=True))
-    covered = [name for name, link in links.items() if link in arm.covers.links]
-    for spring in world.springs.present:
-        require(
-            spring.joint in covered,
-            f"world.springs acts on {spring.joint}, whose link {links[spring.joint]} has no cover, so that sim/contact "
-            f"could not contain its force; allowed: {', '.join(covered)}, or give the link a cover in arm.covers",
-        )
-        cover = next(one for one in rows(arm.covers) if one.link == links[spring.joint])
-        place = float(rotation_xyz(*cover.rotation)[:, 0] @ (np.array([spring.lever, 0.0, 0.0]) - cover.origin))
-        require(
-            -DRIVER.rounding <= place <= cover.length + DRIVER.rounding,
-            f"world.springs.lever is {spring.lever:g} m for {spring.joint}: the spring would push at {place:.4g} m of "
-            f"{cover.name}; allowed: 0 to {cover.length:g} m of it",
-        )
-
-
 class Driver:
     """Steps the plant with the last valid command, as long as it is safe to do so.
 
@@ -122,7 +102,6 @@ class Driver:
             parameters.friction,
             parameters.brake_torque,
         )
-        _require_springs(arm, parameters.world)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
         # packed: objects that live so long drive those in use out of the processor's caches (benchmarks/README.md)

@@ -14,6 +14,8 @@ from mujoco import mj_applyFT
 
 from wam_description.arm import Arm
 from wam_description.contact_pairs import folded
+from wam_description.mjcf import rotation_xyz
+from wam_description.parameters import require, rows
 from wam_description.signals import Load
 from wam_description.small_matrices import cross
 from wam_description.world import Springs
@@ -24,7 +26,6 @@ class SpringOnCover(NamedTuple):
     """A spring with a lever on the link of a cover."""
 
     tendon: int
-    body: int
     cover: str
     lever: float  # m
     rest: float  # length of the tendon at which the spring is not pressed, m
@@ -39,6 +40,14 @@ class PartialLoad(NamedTuple):
     position: float  # where it acts along the cover, m
 
 
+class CoverFrame(NamedTuple):
+    """Where a cover is; views into MuJoCo's memory: to fetch them in each step costs more than a push."""
+
+    rotation: np.ndarray  # (3, 3)
+    origin: np.ndarray  # (3,) m, in the base frame
+    body: int
+
+
 class AppliedPush(NamedTuple):
     """A push on a cover, as it is applied and as it is measured."""
 
@@ -46,8 +55,6 @@ class AppliedPush(NamedTuple):
     body: int
     force: list[float]  # (3,) N, in the frame of the cover
     torque: list[float]  # (3,) N m, about its origin
-    rows: np.ndarray  # (9,) of the rotation of that frame, MuJoCo's memory
-    origin: np.ndarray  # (3,) m, of it in the base frame, MuJoCo's memory
     load: PartialLoad
 
 
@@ -68,15 +75,15 @@ class CoverLoads:
     def __init__(self, model: Any, data: Any, arm: Arm, springs: Springs) -> None:
         self._model, self._data = model, data
         covers = arm.covers
-        # views into MuJoCo's memory: to fetch them in each step costs more than the push
         self._site = {name: model.site(f"{name}_frame").id for name in covers.names}
-        self._rotation = {name: data.site_xmat[site].reshape(3, 3) for name, site in self._site.items()}
-        self._origin = {name: data.site_xpos[site] for name, site in self._site.items()}
+        self._frame = {
+            name: CoverFrame(data.site_xmat[site].reshape(3, 3), data.site_xpos[site], model.body(link).id)
+            for (name, site), link in zip(self._site.items(), covers.links, strict=True)
+        }
         self._applied = data.qfrc_applied
         present = {model.geom(i).name for i in range(model.ngeom)}
         geoms = {geom: name for name in covers.names for geom in (name, folded(name)) if geom in present}
         self._cover_of_geom = {model.geom(geom).id: name for geom, name in geoms.items()}
-        self._body = {name: model.body(link).id for name, link in zip(covers.names, covers.links, strict=True)}
         self._springs = list(_springs_on_covers(model, arm, springs))
         self.pushes: dict[str, AppliedPush] = {}
         turned = np.zeros(6)
@@ -85,18 +92,15 @@ class CoverLoads:
 
     def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
         """Push on a cover, see `Plant.push`."""
-        if cover not in self._origin:
-            raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
+        if cover not in self._frame:
+            raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._frame)}")
         if any(force) or any(torque):
             pushed, turned = np.array(force, float), np.array(torque, float)
             (_, fy, fz), (_, ty, tz) = at_frame = pushed.tolist(), turned.tolist()
             square = fy * fy + fz * fz  # a force along x passes through every position
             position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
             load = PartialLoad(pushed, turned, position)
-            frame = self._site[cover], self._body[cover]
-            self.pushes[cover] = AppliedPush(
-                *frame, *at_frame, self._rotation[cover].reshape(9), self._origin[cover], load
-            )
+            self.pushes[cover] = AppliedPush(self._site[cover], self._frame[cover].body, *at_frame, load)
         else:
             self.pushes.pop(cover, None)
 
@@ -114,8 +118,9 @@ class CoverLoads:
 
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
-        for _, body, (x, y, z), (u, v, w), rows, origin, _ in self.pushes.values():
-            a, b, c, d, e, f, g, h, i = rows.tolist()
+        for cover, (_, body, (x, y, z), (u, v, w), _) in self.pushes.items():
+            frame = self._frame[cover]
+            (a, b, c), (d, e, f), (g, h, i) = frame.rotation.tolist()
             self._turn(
                 a * x + b * y + c * z,
                 d * x + e * y + f * z,
@@ -124,13 +129,13 @@ class CoverLoads:
                 d * u + e * v + f * w,
                 g * u + h * v + i * w,
             )
-            mj_applyFT(self._model, self._data, *self._turned, origin, body, self._applied)
+            mj_applyFT(self._model, self._data, *self._turned, frame.origin, body, self._applied)
 
     def measure(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
         if not (self._data.ncon or self.pushes or self._springs):
             return []
-        parts: dict[str, list[PartialLoad]] = {name: [] for name in self._origin}
+        parts: dict[str, list[PartialLoad]] = {name: [] for name in self._frame}
         for cover, part in chain(self._contacts(), self._pushed(), self._sprung()):
             parts[cover].append(part)
         loads = (_sum(cover, on_cover) for cover, on_cover in parts.items())
@@ -178,10 +183,8 @@ class CoverLoads:
             for geom, sign in ((second, 1.0), (first, -1.0)):  # none between objects, both between links
                 if geom in self._cover_of_geom:
                     cover = self._cover_of_geom[geom]
-                    rotation = self._rotation[cover]
-                    force = rotation.T.dot(sign * contact_force(self._model, data, i))
-                    at = rotation.T.dot(data.contact.pos[i] - self._origin[cover])
-                    yield cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
+                    force = self._frame[cover].rotation.T.dot(sign * contact_force(self._model, data, i))
+                    yield self._part(cover, force, data.contact.pos[i])
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
         for cover, push in self.pushes.items():
@@ -189,14 +192,19 @@ class CoverLoads:
 
     def _sprung(self) -> Iterator[tuple[str, PartialLoad]]:
         data = self._data
-        for tendon, body, cover, lever, rest, bilateral in self._springs:
+        for tendon, cover, lever, rest, bilateral in self._springs:
             squeeze = rest - float(data.ten_length[tendon])
             if squeeze > 0.0 or bilateral:
-                along, across = data.xmat[body].reshape(3, 3).T[:2]
-                rotation = self._rotation[cover]
-                force = rotation.T @ across * (squeeze * float(self._model.tendon_stiffness[tendon]))
-                at = rotation.T @ (data.xpos[body] + lever * along - self._origin[cover])
-                yield cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
+                frame = self._frame[cover]
+                along, across = data.xmat[frame.body].reshape(3, 3).T[:2]
+                force = frame.rotation.T @ across * (squeeze * float(self._model.tendon_stiffness[tendon]))
+                yield self._part(cover, force, data.xpos[frame.body] + lever * along)
+
+    def _part(self, cover: str, force: np.ndarray, place: np.ndarray) -> tuple[str, PartialLoad]:
+        """The load of a force in the frame of its cover, (3,), N, at a place in the base frame, (3,), m."""
+        rotation, origin, _ = self._frame[cover]
+        at = rotation.T.dot(place - origin)
+        return cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
 
 
 def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
@@ -230,10 +238,23 @@ def half_lengths(model: Any, geom: int) -> np.ndarray:
 
 
 def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:
+    """The springs; one on a link without a cover, or beyond the ends of it, is refused: no message gives its force."""
     tendons = range(2 * len(arm.motors.names), model.ntendon)  # after the strands of the cables
+    links = dict(zip(arm.joints.names, arm.links.names, strict=True))
+    covers = {cover.link: cover for cover in rows(arm.covers)[::-1]}
     for tendon, spring in zip(tendons, springs.present, strict=True):
-        link = arm.links.names[arm.joints.names.index(spring.joint)]
-        if link in arm.covers.links:
-            cover = arm.covers.names[arm.covers.links.index(link)]
-            rest = spring.lever * spring.rest
-            yield SpringOnCover(tendon, model.body(link).id, cover, spring.lever, rest, spring.bilateral)
+        link, covered = links[spring.joint], ", ".join(joint for joint in links if links[joint] in covers)
+        require(
+            link in covers,
+            f"world.springs acts on {spring.joint}, whose link {link} has no cover, so that sim/contact could not "
+            f"contain its force; allowed: {covered}, or give the link a cover in arm.covers",
+        )
+        cover = covers[link]
+        place = float(rotation_xyz(*cover.rotation)[:, 0] @ (np.array([spring.lever, 0.0, 0.0]) - cover.origin))
+        require(
+            -PLANT.rounding <= place <= cover.length + PLANT.rounding,
+            f"world.springs.lever is {spring.lever:g} m for {spring.joint}: the spring would push at {place:.4g} m of "
+            f"{cover.name}; allowed: 0 to {cover.length:g} m of it",
+        )
+        rest = spring.lever * spring.rest
+        yield SpringOnCover(tendon, cover.name, spring.lever, rest, spring.bilateral)

@@ -22,6 +22,7 @@ class PlantThresholds:
     # of the sharing between the ends of a tube: energy is conserved to 0.2 %, and depths within 2 % count as equal
     sharpness: int = 32
     smallest_depth: float = 1e-12  # m
+    rounding: float = 1e-9  # m, of a contact position
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,6 @@ class DriverThresholds:
     """When the driver warns, waits and reports."""
 
     recent: float = 0.2  # s, for which a push that has ended may be the cause of what the arm does
-    rounding: float = 1e-9  # m, of a contact position
     status_period: float = 0.05  # s, between repetitions of the status in realtime, so that every node knows the brakes
     warning: float = 0.9  # of a limit
     leeway: float = 0.05  # rad, by which an arm that was enabled beyond a stop may go on before it is stopped again
