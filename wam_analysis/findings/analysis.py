@@ -200,7 +200,7 @@ def _foreign_line(recording: AnalysedRecording) -> str:
     held = [counted(len(joints), "joint"), *([counted(len(wrenches), "wrench topic")] if wrenches else [])]
     unused = [title for title, kind in recording.bag.types.items() if kind == UNUSED]
     line = f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
-    return f"{line} Not used: {'; '.join(unused)}; rename each that you need to {RENAMED}." if unused else line
+    return f"{line} Not used: {'; '.join(unused)}; rename those that you need: {RENAMED}." if unused else line
 
 
 def happened_section(recording: AnalysedRecording) -> Section:

@@ -26,7 +26,7 @@ NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was n
 COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
 UNUSED = "unused column"  # in place of the type of a topic
-RENAMED = "position.JOINT, velocity.JOINT or effort.JOINT; for a single joint, --map position=COLUMN does it"
+RENAMED = "position.JOINT, velocity.JOINT or effort.JOINT; for a single joint, give --map position=COLUMN instead"
 
 
 def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
@@ -114,7 +114,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
         parts = {q: {one.name: one for one in columns if one.is_command is is_command} for q, columns in found.items()}
         topics |= {f"{name}{suffix}": one for name, one in _topics(parts, times, known, given)}
     if not topics:
-        raise BagError(f"{path} has the columns {', '.join(map(str, series))}; rename each that you need to {RENAMED}")
+        raise BagError(f"{path} has the columns {', '.join(map(str, series))}; rename those that you need: {RENAMED}")
     types = {topic: COMMAND if topic.endswith("_command") else "table" for topic in topics}
     types |= {str(one): UNUSED for one in series if str(one) not in used and str(one).strip()}
     return checked(Bag(path, topics, types, {}, {}, dict.fromkeys(topics, len(times))), given), given
