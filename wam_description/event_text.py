@@ -2,12 +2,13 @@
 
 import math
 import string
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Final
 
 from wam_description.event import Code, Event
 from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
+from wam_description.signals import NodeStatus
 
 ALSO: Final = "; also: "  # between two events
 REASONS: Final = {
@@ -211,8 +212,10 @@ def sentences(events: Iterable[Event]) -> str:
     return ALSO.join(filter(None, dict.fromkeys(map(sentence, events))))
 
 
-def in_lines(text: str) -> str:
-    """The words of several events for a terminal, each on a line of its own."""
+def news(status: NodeStatus, known: Collection[object]) -> str:
+    """What a status states of other subjects than those that are known, for a terminal: a line for each event."""
+    new = [one for one in status.events if one.subject not in known]
+    text = status.message if len(new) == len(status.events) else sentences(new)
     return text.replace(ALSO, f"\n    {ALSO.removeprefix('; ')}")
 
 

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from wam_description.configuration import Configuration
 from wam_description.event import Code, Event, Level, fault
-from wam_description.event_text import in_lines, sentence
+from wam_description.event_text import news, sentence
 from wam_description.interface import Feed, declared
 from wam_description.signals import NodeStatus
 from wam_description.status import REFUSED
@@ -188,7 +188,7 @@ class AdaptedNode(StackNode):
         elif status.level is Level.WARN:
             if before is WAITING or not status.subjects <= before.subjects:
                 refused = f"{status.facts[REFUSED]}: refused: " if REFUSED in status.facts else ""
-                self.get_logger().warning(refused + in_lines(status.message))
+                self.get_logger().warning(refused + news(status, before.subjects))
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
 

@@ -15,7 +15,7 @@ from wam_control.task.scenario_settings import require_settings
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.event import Event, Level
-from wam_description.event_text import in_lines
+from wam_description.event_text import news
 from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build
 from wam_description.signals import NodeStatus, State
@@ -111,10 +111,9 @@ class Simulation:
         self.listen(STATUS, lambda _, status: self._warn(name, status), name)
 
     def _warn(self, node: str, status: NodeStatus) -> None:
-        is_known = status.subjects <= self._warned.get(node, set())
-        self._warned[node] = status.subjects
-        if status.level is Level.WARN and not is_known:
-            logging.getLogger("wam_sim").warning("warning: %s: %s", node, in_lines(status.message))
+        known, self._warned[node] = self._warned.get(node, set()), status.subjects
+        if status.level is Level.WARN and not status.subjects <= known:
+            logging.getLogger("wam_sim").warning("warning: %s: %s", node, news(status, known))
 
     def _requesting(self, node: Any, work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
         """The step of a node together with its requests to others."""

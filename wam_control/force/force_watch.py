@@ -168,6 +168,8 @@ class ForceWatch:
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
         self._is_refused, self._is_decided, self._has_settled = True, False, False
         self._desired, self._travel = math.nan, 0.0
+        # values of what is stated for some time after it last was so
+        self._doubted, self._differing = dict[str, Value](), dict[str, Value]()
         self._pattern: Array | None = None  # m, torques per force that it did not explain as it settled
 
     def step(self, axis: CommandedAxis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
@@ -229,8 +231,10 @@ class ForceWatch:
         error = math.hypot(known.errors.size, off)
         is_doubtful = error > known.tolerance and self.touch.is_there
         lasting = own.limits.settling_time
+        if is_doubtful:
+            self._doubted = self._wrong(error, axis, known, own)
         is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
-        return [warning(Code.REFUSED, "uncertain", **self._wrong(error, axis, known, own))] if is_on else []
+        return [warning(Code.REFUSED, "uncertain", **self._doubted)] if is_on else []
 
     def _wrong(self, error: float, axis: CommandedAxis, known: Belief, own: ForceLoopParameters) -> dict[str, Value]:
         """By how much a force may be wrong, N, and why."""
@@ -273,10 +277,11 @@ class ForceWatch:
         where: dict[str, Value] = {"cover": axis.place.cover, "position": axis.place.position}
         is_strange = known.chi2 > FORCE.unexplained and self.touch.is_there
         lasting = own.limits.settling_time
-        if self._strange.step(is_strange, lasting, lasting, dt):
+        if is_strange:
             source = _source(own, self._is_dithered)
-            given: dict[str, Value] = {"chi2": known.chi2, "allowed": FORCE.unexplained, "source": source}
-            return [warning(Code.UNEXPLAINED, "torques_differ", **where, **given)]
+            self._differing = {**where, "chi2": known.chi2, "allowed": FORCE.unexplained, "source": source}
+        if self._strange.step(is_strange, lasting, lasting, dt):
+            return [warning(Code.UNEXPLAINED, "torques_differ", **self._differing)]
         if self._right.is_on and self._pattern is None:
             # with the pose the torques of the force change, too; what is estimated moves with whatever else pushes
             self._pattern = torques / known.force + axis.sensed.press * axis.place.is_pinned
