@@ -14,7 +14,7 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.rigid_body import RigidBody
 
 INFERENCE = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).inference
-SMOOTH = dataclasses.replace(INFERENCE, friction=1e-3, moment_arm_offset=1e-3)
+SMOOTH = dataclasses.replace(INFERENCE, friction=1e-3, moment_arm_offset=1e-3, fusion_time=1.0)
 START, SPEED = np.array([0.2, -1.05, 0.3, 0.6]), np.array([0.6, 0.5, -0.6, 0.7])  # rad, rad/s
 SD, STEP = 0.05, 0.0301  # N m; s
 FORCE, PLACE = (0.0, 6.0, 5.0), 0.28
@@ -55,11 +55,10 @@ def played(
     stays: float,
     moves: bool = True,
     count: int = 7,
-    duration: float = 1.0,
     slides: float = 0.0,
 ) -> tuple[list[Hypothesis], ContactFusion]:
     """The best explanation at each moment of a push, whose torques err by a part that stays and one that changes."""
-    inference, fusion = ContactInference(WAM, RigidBody(WAM), SMOOTH), ContactFusion(duration)
+    inference = ContactInference(WAM, RigidBody(WAM), SMOOTH)
     own, staying = np.eye(4) * SD**2 * (1.0 - stays), np.eye(4) * SD**2 * stays
     bias = SD * np.sqrt(stays) * random.standard_normal(4)
     found = []
@@ -69,8 +68,8 @@ def played(
         place = PLACE - slides * (count - 1 - k) * STEP
         seen = torques(q, "outer_link", (place, 0.0, 0.0), FORCE) + error
         now = Torques(k * STEP, seen, np.eye(4), staying, own, q)
-        found.append(inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, fusion, now)[0])
-    return found, fusion
+        found.append(inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, now)[0])
+    return found, inference.fusion
 
 
 def errors(stays: float) -> np.ndarray:
@@ -121,14 +120,14 @@ def test_an_arm_that_does_not_move_shows_nothing_new() -> None:
 def test_a_force_that_grows_is_followed_at_once_and_one_from_another_side_forgets_the_one_before(
     change: float, least: int, most: int
 ) -> None:
-    inference, fusion = ContactInference(WAM, RigidBody(WAM), SMOOTH), ContactFusion(1.0)
+    inference = ContactInference(WAM, RigidBody(WAM), SMOOTH)
     for k in range(9):
         q = START + k * STEP * SPEED
         force = np.array(FORCE) * (1.0 if k < 8 else change)
         seen = torques(q, "outer_link", (PLACE, 0.0, 0.0), force.tolist())
         now = Torques(k * STEP, seen, np.eye(4), 0.0 * np.eye(4), SD**2 * np.eye(4), q)
-        best = inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, fusion, now)[0]
-    assert least <= fusion.count <= most
+        best = inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, now)[0]
+    assert least <= inference.fusion.count <= most
     assert best.force == pytest.approx(force, abs=1.0)
     assert best.position == pytest.approx(PLACE, abs=0.01)
 
@@ -136,9 +135,9 @@ def test_a_force_that_grows_is_followed_at_once_and_one_from_another_side_forget
 @pytest.mark.parametrize("sd", [1e-6, 1e-5, 1e-4, 1e-3])
 def test_errors_so_small_that_rounding_counts_end_no_estimate(sd: float) -> None:
     """A mass uncertainty keeps the covariance of one moment large, that of what changes is tiny."""
-    random, inference = np.random.default_rng(2), ContactInference(WAM, RigidBody(WAM), INFERENCE)
+    random, lasting = np.random.default_rng(2), dataclasses.replace(INFERENCE, fusion_time=1.0)
     for _ in range(8):
-        fusion = ContactFusion(1.0)
+        inference = ContactInference(WAM, RigidBody(WAM), lasting)
         force = random.uniform(-40.0, 40.0, 3).tolist()
         for k in range(12):
             q = START + k * STEP * SPEED
@@ -146,5 +145,5 @@ def test_errors_so_small_that_rounding_counts_end_no_estimate(sd: float) -> None
             weight = np.diag(0.3 * random.uniform(0.5, 5.0, 4))
             now = Torques(k * STEP, seen, np.hstack((weight, sd * np.eye(4))), np.eye(8), sd**2 * np.eye(4), q)
             precision = np.linalg.inv(weight @ weight.T + 2.0 * sd**2 * np.eye(4))
-            found = inference.infer(q.tolist(), seen.tolist(), precision, None, fusion, now)
+            found = inference.infer(q.tolist(), seen.tolist(), precision, None, now)
             assert sum(one.probability for one in found) == pytest.approx(1.0)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact.contact_fusion import ContactFusion
 from wam_control.contact.contact_inference import NO_HYPOTHESIS, ContactInference, Hypothesis, detection_statistic
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.model_errors import TrackedError
@@ -115,7 +114,6 @@ class ContactEstimator:
         self._delay = parameters.observer.time_constant + 0.5 * cycle * timing.period  # s, of the torques
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
-        self._fusion = ContactFusion(parameters.inference.fusion_time)
         self._is_blind = False
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
         self.refused = 0
@@ -132,7 +130,7 @@ class ContactEstimator:
         """
         reason = self._observer.zero()
         if not reason:
-            self._fusion.reset()
+            self._inference.fusion.reset()
         return reason
 
     def reset(self) -> None:
@@ -147,7 +145,7 @@ class ContactEstimator:
         # of the estimates at the last two ages: age of the observer, s, and torques, N m
         none: tuple[float, Array | None] = 0.0, None
         self._before, self._last = none, none
-        self._fusion.reset()
+        self._inference.fusion.reset()
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -204,12 +202,11 @@ class ContactEstimator:
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
             if was_in_contact:
-                self._fusion.reset()
+                self._inference.fusion.reset()
             return ContactEstimate(external, sd, statistic, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
-        now = observer.moment(torques) if parameters.inference.fusion_time else None
-        late = self._late(torques, precision, size)
-        hypotheses = self._inference.infer(observer.seen.pose, torques, precision, load, self._fusion, now, late)
+        now, late = observer.moment(torques), self._late(torques, precision, size)
+        hypotheses = self._inference.infer(observer.seen.pose, torques, precision, load, now, late)
         return ContactEstimate(external, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
 
     def _late(self, torques: Array, precision: Array, statistic: float) -> float:

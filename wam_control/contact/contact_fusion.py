@@ -149,7 +149,7 @@ class ContactFusion:
                 self.reset()
         moments, last = self._moments, self._last
         is_early = last is not None and now.time - last.torques.time < CONTACT.moment_interval
-        if is_early or not self._duration or now.own.diagonal().min() < CONTACT.finest_sd**2:
+        if is_early or now.own.diagonal().min() < CONTACT.finest_sd**2:
             return
         has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > CONTACT.pose_change
         if has_moved:

@@ -99,6 +99,7 @@ class ContactInference:
     Attributes
     ----------
     jacobians : (covers, 6, n), of the covers in the last pose.
+    fusion : earlier moments of the present contact.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
@@ -118,6 +119,7 @@ class ContactInference:
         )
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
+        self.fusion = ContactFusion(parameters.fusion_time)
 
     def infer(
         self,
@@ -125,7 +127,6 @@ class ContactInference:
         torques: ArrayLike,
         precision: Array,
         load: Array | None = None,
-        fusion: ContactFusion | None = None,
         now: Torques | None = None,
         late: float = 0.0,
     ) -> tuple[Hypothesis, ...]:
@@ -137,8 +138,7 @@ class ContactInference:
         torques : (n,), external torques, N m.
         precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); not below `smallest_sd`.
         load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
-        fusion : earlier moments of the same contact, to which this one is added; None for this one alone.
-        now : the same torques with what is known of their errors, for `fusion`.
+        now : the same torques with what is known of their errors, to add them to `fusion`; None for them alone.
         late : by which fraction the force has changed that the torques do not show yet.
 
         Returns
@@ -148,7 +148,7 @@ class ContactInference:
         """
         given, links = self._parameters, len(self._covers)
         if (size := sum(precision.diagonal().tolist())) > (10.0 * CONTACT.smallest_sd) ** -2:
-            fusion = None  # together they would be as exact
+            now = None  # together they would be as exact
         if size > CONTACT.smallest_sd**-2:
             precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(precision)))
         self.jacobians = np.array([self._body.cover_jacobian(q, cover.name) for cover in self._covers])
@@ -157,7 +157,7 @@ class ContactInference:
         np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
         if load is not None:
             rows[links, 1] = load
-        gram = fusion.gram(rows, now) if fusion is not None and now is not None else None
+        gram = None if now is None else self.fusion.gram(rows, now)
         if gram is None:
             gram = rows @ precision @ rows.transpose(0, 2, 1)
         payload = -math.inf
@@ -168,9 +168,9 @@ class ContactInference:
         fits = self._fit(gram[:links], payload)
         order = sorted(range(links), key=lambda i: -fits[i].probability)
         best, moments = fits[order[0]], 1
-        if fusion is not None and now is not None:
-            moments = fusion.count
-            fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
+        if now is not None:
+            moments = self.fusion.count
+            self.fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
         reasons, doubtful = NO_REASON, 0.5
         if best.probability < given.identification_threshold:
             reasons, doubtful = self._why_ambiguous(q, set(order[:2]), fits), CONTACT.noted_probability

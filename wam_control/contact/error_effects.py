@@ -147,7 +147,8 @@ class ErrorEffects:
         effects = np.zeros((n, 14 * n + 2))
         sizes = np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded))
         np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
-        own = modelled[:, None] * self._differs - np.diag(self._from_motors.T.dot(residual))
+        own = modelled[:, None] * self._differs
+        own.ravel()[:: n + 1] -= self._from_motors.T.dot(residual)  # the diagonal
         effects[:, 8 * n : 9 * n] = self._to_joints.dot(own)
         effects[:, 9 * n : 11 * n] = -self._through * (self._dynamic * slope)
         effects[:, 11 * n] = self._to_joints.dot(signals[-n:])

@@ -104,21 +104,17 @@ class MomentumObserver:
             prior, parameters.drift, side.map.motor_from_joint.T, noise, parameters.motor_torque_sd**2
         )
         self._filters = _Filters(n, (3 if use_joint_sensors else 14 + 2 * len(LOG_DISTANCES)) * n, times, cycle)
-        self.seen = self._begin()
+        self.reset()
+        self.seen = self._observation()
 
     def reset(self) -> None:
         """Forget all samples."""
-        self.seen = self._begin()
-
-    def _begin(self) -> Observation:
-        """Forget all samples; the moment before them."""
         n = self._n
-        self._filters = self._filters.empty_copy()
+        self._filters.reset()
         self._last = _Sample([0.0] * n, [0.0] * n, [], np.zeros((n, n)), [], [], None)
         self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
-        return self._observation()
 
     @property
     def is_ready(self) -> bool:
@@ -154,7 +150,8 @@ class MomentumObserver:
         if not (0.0 < dt < math.inf):
             return False
         position, velocity, effort = state
-        finite = math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
+        # of joint sensors, what follows from the sample is finite only if the sample is
+        finite = self._is_link_side or math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
         if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
@@ -319,22 +316,22 @@ class _Filters:
     """
 
     def __init__(self, n: int, size: int, times: Sequence[float], cycle: int) -> None:
-        self.times, self.cycle, self.count = times, cycle, 0
-        self._n = n
-        self._values = np.zeros((len(times), size))
+        self.times, self.cycle, self._n = times, cycle, n
         self._ring = np.zeros((cycle, size))
         self._span = math.inf
-        self._keeps = self._takes = self._values  # one for each number: numpy multiplies by a single one more slowly
+        # one for each number: numpy multiplies by a single one more slowly
+        self._keeps = self._takes = self._empty = np.zeros((len(times), size))
+        self.reset()
 
-    def empty_copy(self) -> "_Filters":
-        """The same without samples."""
-        return _Filters(self._n, self._values.shape[1], self.times, self.cycle)
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._values, self.count = self._empty, 0
 
     def take(self, present: Array, span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
         before, n = self._values, self._n
         if not self.count:
-            self._values = present + np.zeros_like(before)
+            self._values = present + self._empty
         else:
             if span != self._span:
                 keep = [[math.exp(-span / time)] for time in self.times]
