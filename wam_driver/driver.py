@@ -12,7 +12,7 @@ from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.event import Value, fault
 from wam_description.mismatch import ModelMismatch, true_arm
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import parameter
 from wam_description.signals import BASE, NO_LOAD, ZERO, Answer, Load, Point, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
@@ -254,15 +254,10 @@ class Driver:
             self.plant.push(self._disturbed, ZERO, ZERO)
             self._disturbed = ""
 
-    def set_added_friction(self, friction: Sequence[float]) -> None:
-        """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""
-        lengths("effects", self._arm.joints.names, {"added_coulomb_friction": tuple(friction)})
-        self.plant.set_added_friction(friction)
-
     def set_effects(self, effects: Effects) -> None:
         """Take the effects that can change while the arm runs: added friction, active pretension."""
         effects.require_fit(self._arm)
-        self.set_added_friction(effects.added_coulomb_friction)
+        self.plant.set_added_friction(effects.added_coulomb_friction)
         self.plant.set_pretension(effects.pretension_share)
 
     # what a node of a direct run may request by name

@@ -157,10 +157,6 @@ class Lockstep:
 
     lateness = ""  # nothing is late in lockstep
 
-    def settles(self) -> bool:
-        """Whether the start is to wait for the computer: in lockstep the arm itself does."""
-        return False
-
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
         if self.is_started and self._patience < self._timing.timeout:

@@ -408,7 +408,7 @@ def test_drift_of_friction_is_followed_and_published_once_a_second() -> None:
     while not run.step():
         tick += 1
         if tick == 6000:
-            run.driver.set_added_friction([0.3 * level, 0.0, 0.0, 0.0])
+            run.driver.plant.set_added_friction([0.3 * level, 0.0, 0.0, 0.0])
     rows = run.rows["contact/tracked_friction"]
     stamps = [row.stamp // 1_000_000_000 for row in rows]
     assert stamps == list(range(stamps[0], stamps[-1] + 1))

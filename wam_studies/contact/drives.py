@@ -131,7 +131,7 @@ def record(drive: Drive) -> DriveRecording:
     while not done:
         k = len(rows)
         if degradation.drift and k % drift_every == 0:
-            run.driver.set_added_friction((degradation.drift * k * period / drive.seconds * nominal).tolist())
+            run.driver.plant.set_added_friction((degradation.drift * k * period / drive.seconds * nominal).tolist())
         state = run.driver.motor_state
         rows.append([*state.position, *state.velocity, *state.effort, max(map(abs, run.driver.plant.qd))])
         _push(run, arm, contacts, k * period)
