@@ -7,7 +7,7 @@ from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.parameters import aligned, require
-from wam_driver.friction import LAWS, Asymmetric, FrictionLaw, FrictionParameters, LoadDependent, Presliding, each_shaft
+from wam_driver.friction import LAWS, FrictionParameters, Presliding, each_shaft
 from wam_driver.thresholds import PLANT
 
 
@@ -47,18 +47,16 @@ class DryFriction:
         aligned("friction", motors.names, parameters)
         static = [*motors.static_friction, *joints.static_friction]
         dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]
-        asymmetry = each_shaft(parameters.motor_asymmetry, parameters.joint_asymmetry, size)
-        factors = each_shaft(parameters.motor_load_factor, parameters.joint_load_factor, size)
+        self._asymmetry = each_shaft(parameters.motor_asymmetry, parameters.joint_asymmetry, size)
+        self._factors = each_shaft(parameters.motor_load_factor, parameters.joint_load_factor, size)
         stiffness = each_shaft(parameters.motor_presliding_stiffness, parameters.joint_presliding_stiffness, size)
         _refuse_too_stiff([*motors.names, *joints.names], stiffness, step, compliance)
-        self._laws = [
-            _composed(law, factor, lean)
-            for law, factor, lean in zip(
-                LAWS[parameters.law](static, dynamic, parameters), factors, asymmetry, strict=True
-            )
-        ]
+        self._laws = list(LAWS[parameters.law](static, dynamic, parameters))
         self._presliding = {i: Presliding(sigma) for i, sigma in enumerate(stiffness) if sigma > 0.0}
-        self._varying = [i for i, law in enumerate(self._laws) if not law.is_steady or i in self._presliding]
+        varied = zip(stiffness, self._factors, self._asymmetry, strict=True)
+        self._varying = [
+            i for i, (law, more) in enumerate(zip(self._laws, varied, strict=True)) if not law.is_steady or any(more)
+        ]
         self.is_steady = not self._varying
         self._tension_friction, self._circuits = effects.tension_friction, tuple(arm.circuits)
         self._added = tuple(effects.added_coulomb_friction)
@@ -104,8 +102,8 @@ class DryFriction:
         from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in each_circuit]
         self._extra = [*from_tension, *self._added]
         each = list(zip(self._laws, self._warm, self._extra, strict=True))
-        self._static = [law.level(0.0, 0, 0.0) * warm + extra for law, warm, extra in each]
-        self._dynamic = [law.level(1.0, 1, 0.0) * warm + extra for law, warm, extra in each]
+        self._static = [law.level(0.0) * warm + extra for law, warm, extra in each]
+        self._dynamic = [law.level(1.0) * warm + extra for law, warm, extra in each]
         by_shaft = zip(self.direction, self._static, self._dynamic, strict=True)
         self.levels = [moving if way else stuck for way, stuck, moving in by_shaft]
 
@@ -160,21 +158,16 @@ class DryFriction:
     def _evaluate(self, velocity: Sequence[float], load: Sequence[float], held: Sequence[float]) -> None:
         """Levels of the shafts whose law depends on more than whether they move; elastic torques."""
         for i in self._varying:
-            if self.direction[i]:
-                level = self._laws[i].level(velocity[i], self.direction[i], load[i])
-            else:  # friction holds the torque that is opposite to its own
-                level = self._laws[i].level(0.0, (held[i] < 0.0) - (held[i] > 0.0), load[i])
-            level = level * self._warm[i] + self._extra[i]
+            way, speed = self.direction[i], velocity[i]
+            if not way:  # friction holds the torque that is opposite to its own
+                way, speed = (held[i] < 0.0) - (held[i] > 0.0), 0.0
+            level = self._laws[i].level(speed) + self._factors[i] * abs(load[i])
+            level = level * (1.0 + self._asymmetry[i] * way) * self._warm[i] + self._extra[i]
             if i in self._presliding:
                 # the plant's integrator moves a shaft by step times its new velocity
                 self.elastic[i] = -self._presliding[i].advance(velocity[i] * self._step, level)
                 level = 0.0
             self.levels[i] = level
-
-
-def _composed(law: FrictionLaw, load_factor: float, asymmetry: float) -> FrictionLaw:
-    loaded = LoadDependent(law, load_factor) if load_factor else law
-    return Asymmetric(loaded, asymmetry) if asymmetry else loaded
 
 
 def _refuse_too_stiff(

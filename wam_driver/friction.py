@@ -27,15 +27,8 @@ class FrictionLaw(Protocol):
 
     is_steady: bool
 
-    def level(self, velocity: float, direction: int, load: float) -> float:
-        """Magnitude of the friction torque, N m, not negative.
-
-        Parameters
-        ----------
-        velocity : rad/s; exactly 0 while the shaft is stuck.
-        direction : sign of the motion; while stuck, of the torque that friction holds; 0 if there is none.
-        load : torque that the cables transmit to the shaft, N m.
-        """
+    def level(self, velocity: float) -> float:
+        """Magnitude of the friction torque, N m, not negative, at a velocity, rad/s, exactly 0 while it is stuck."""
         ...
 
 
@@ -47,7 +40,7 @@ class CoulombStiction:
     def __init__(self, static: float, dynamic: float) -> None:
         self._static, self._dynamic = static, dynamic
 
-    def level(self, velocity: float, direction: int, load: float) -> float:
+    def level(self, velocity: float) -> float:
         """F_s or F_d, N m."""
         return self._dynamic if velocity else self._static
 
@@ -61,35 +54,9 @@ class Stribeck:
         self._dynamic, self._drop = dynamic, static - dynamic
         self._velocity, self._exponent = velocity, exponent
 
-    def level(self, velocity: float, direction: int, load: float) -> float:
+    def level(self, velocity: float) -> float:
         """Level at this velocity, N m."""
         return self._dynamic + self._drop * math.exp(-((abs(velocity) / self._velocity) ** self._exponent))
-
-
-class LoadDependent:
-    """Adds friction in proportion to the transmitted torque, as a gear or a loaded bearing does."""
-
-    is_steady = False
-
-    def __init__(self, law: FrictionLaw, factor: float) -> None:
-        self._law, self._factor = law, factor
-
-    def level(self, velocity: float, direction: int, load: float) -> float:
-        """Level of the law plus factor |load|, N m."""
-        return self._law.level(velocity, direction, load) + self._factor * abs(load)
-
-
-class Asymmetric:
-    """Scales friction by 1 + a for positive motion and 1 - a for negative motion."""
-
-    is_steady = False
-
-    def __init__(self, law: FrictionLaw, asymmetry: float) -> None:
-        self._law, self._asymmetry = law, asymmetry
-
-    def level(self, velocity: float, direction: int, load: float) -> float:
-        """Level of the law, scaled for this direction, N m."""
-        return self._law.level(velocity, direction, load) * (1.0 + self._asymmetry * direction)
 
 
 class Presliding:
