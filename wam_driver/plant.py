@@ -256,10 +256,8 @@ class Plant:
         ValueError
             for a part that is below 0, or for another number of them; nothing is changed then.
         """
-        before = self._view.plastic.copy()
         self._friction.set_circuits(self._circuits.tighten(list(each(tuple(shares), self._n))))
-        position, plastic = self._kept
-        self._kept = position, (plastic + (self._view.plastic - before)).tolist()
+        self._kept = self._kept[0], self._view.plastic.tolist()
         self._is_set = False
 
     def step(self, torque: Sequence[float], count: SupportsIndex = 1) -> None:
