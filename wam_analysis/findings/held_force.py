@@ -131,7 +131,8 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     steady, late = ((1.0 - part) * duration for part in (HOLD.steady, CYCLE.late_part))
-    bound = traces.estimated.is_lower_bound[rows][signals["estimated"][0] >= steady]
+    compared = (signals["estimated"][0] >= steady) & np.isfinite(estimated)  # on this link
+    bound = traces.estimated.is_lower_bound[rows][compared]
     accuracy = {name: _accuracy(force[at >= steady] - hold.commanded) for name, (at, force) in signals.items()}
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
