@@ -102,10 +102,7 @@ class TaskAxes:
         ]
         is_alone = len(pressed) == 1
         torques = [[] if is_alone else self._disturbance(q, *one) for one in zip(task.axes, pressed, strict=True)]
-        return [
-            self._axis(q, i, task.axes, directions[i], in_frame[i], pressed[i], torques, places[i])
-            for i in range(len(task.axes))
-        ]
+        return [self._axis(q, i, task.axes, in_frame[i], pressed[i], torques, places[i]) for i in range(len(task.axes))]
 
     def rotation(self, q: Angles, frame: str) -> Array:
         """Rotation (3, 3) of the frame of a command into the base frame."""
@@ -124,13 +121,12 @@ class TaskAxes:
         q: Angles,
         i: int,
         axes: Sequence[TaskAxis],
-        direction: Array,
         in_frame: Array,
         pressed: PressedForce,
         torques: Sequence[list[Array]],
         place: ForcePlace,
     ) -> CommandedAxis:
-        axis = axes[i]
+        axis, direction = axes[i], pressed.direction
         if axis.joint >= 0:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
             return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, float(q[axis.joint]))

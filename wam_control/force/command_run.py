@@ -1,7 +1,7 @@
 """The state of one command: a new object where something else is commanded."""
 
 import math
-from collections import deque
+from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
@@ -36,7 +36,7 @@ class AxisRun:
         probable first.
     known : what is known of its force.
     place : where its force acts.
-    watch, motion : what is reported of its force, or of its motion.
+    watch : what is reported of its force.
     anchor : position to hold where none is commanded, m or rad.
     wound_up : force, N, to which the velocity loops have wound up before its torque is fed forward; infinite while they
         do, NaN until the touch.
@@ -49,7 +49,7 @@ class AxisRun:
         self.on_links: Links
         self.known = UNKNOWN
         self.place = ContactPlace(covers)
-        self.watch, self.motion = ForceWatch(is_dithered), MotionWatch()
+        self.watch = ForceWatch(is_dithered)
         self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
         self.rising = self._shown = 0.0
         self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
@@ -147,6 +147,7 @@ class CommandRun:
     task : what is commanded; None for a posture alone.
     arm : the arm as the controller knows it.
     timing : of the loops.
+    q : joint angles (n,), rad.
     resting : torques of the world on the joints (n,), N m, of the arm at rest as it begins, not taken as zero.
     still_sd : standard deviations of the torques of the world (n,), N m, then; later, as the arm last held.
     is_moving : whether the arm moves too fast for these to be known.
@@ -157,20 +158,21 @@ class CommandRun:
     held_at : joint angles (n,), rad, that the arm holds while the command is not obeyed; None while it is.
     resting : torques at rest (n,), N m, that are the error of a model, not those of a touched surface.
     approached : way of the posture along the forces to what they touch (n,), rad.
-    free_at, before : where the arm last was free, and a period ago (n,), rad; None at first.
+    free_at, before : where the arm last was free, and a period ago (n,), rad.
     is_moving : whether the arm still moves as it did when the command began.
     delayed : speeds along the axes that are still to come, m/s or rad/s.
-    joints : what is reported of a posture, of each joint.
+    motions : what is reported of the motions along the axes, or of the joints in a posture.
     friction : that is fed forward, N m at the joints (n,), filtered.
     search, ways : what would help a refused force: still to be tried, and found.
     """
 
     def __init__(
         self,
-        key: object,
+        key: tuple[object, ...],
         task: TaskCommand | None,
         arm: Arm,
         timing: Timing,
+        q: Array,
         resting: Array,
         still_sd: Array,
         is_moving: bool,
@@ -180,12 +182,11 @@ class CommandRun:
         self.held_at: Array | None = None
         self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()
         self.approached = np.zeros_like(resting)
-        self.free_at: Array | None = None
-        self.before: Array | None = None
+        self.free_at = self.before = q
         self.is_moving = is_moving
         self.still_sd = still_sd
-        self.delayed: deque[list[float]] = deque()
-        self.joints = {name: MotionWatch() for name in arm.joints.names}
+        self.delayed = list[list[float]]()
+        self.motions = defaultdict[int, MotionWatch](MotionWatch)
         self.friction = LowPass()
         self.search: Iterator[Ways] | None = None
         self.ways: Ways = {}

@@ -24,7 +24,7 @@ from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
-from wam_control.force.force_watch import MotionWatch, Seen
+from wam_control.force.force_watch import Seen
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
@@ -137,7 +137,7 @@ class ForceLoop:
         self.events: tuple[Event, ...] = ()
         self.tune(parameters)
         zero = np.zeros(len(self._velocity))
-        self._run = CommandRun(None, None, arm, timing, zero, zero, False)
+        self._run = CommandRun((), None, arm, timing, zero, zero, zero, False)
 
     def tune(self, parameters: ForceLoopParameters) -> None:
         """Take new parameters, or refuse the set.
@@ -225,7 +225,7 @@ class ForceLoop:
         if given.task is None and given.torque is not None and own.mode != "open_loop":
             topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
             given = given._replace(task=TaskCommand(BASE, torques), torque=None)
-        if given.task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
+        if given.task is None and self._run.key[:1] == (TaskCommand,):
             self._admission.restart(self._q)  # the arm stays where it is
         admitted = self._admission
         admitted.step(own, self._q, given.command, given.posture, given.torque, dt, given.task)
@@ -267,9 +267,9 @@ class ForceLoop:
         self._measurement.restart()
         self._pushed.restart()
         self._velocity = np.zeros(len(self._q))
-        self._begin(None, None)
+        self._begin(None, ())
 
-    def _begin(self, task: TaskCommand | None, key: object, is_free: bool = False) -> None:
+    def _begin(self, task: TaskCommand | None, key: tuple[object, ...], is_free: bool = False) -> None:
         """Something else is commanded: what a free arm at rest measures is the error of its model."""
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
         still_sd = measurement.torques.sd
@@ -279,8 +279,9 @@ class ForceLoop:
             if is_free:
                 measurement.zero(limit)
             resting = measurement.resting
-        is_moving = task is not None and bool(limit) and FORCE.fast < measurement.speed < math.inf
-        before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, still_sd, is_moving)
+        is_moving = task is not None and bool(limit) and measurement.speed > FORCE.fast
+        arm, before = self._body.arm, self._run
+        self._run = CommandRun(key, task, arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.go_on(before)
 
     def _find_axes(self, task: TaskCommand | None, contact: Contact) -> None:
@@ -310,7 +311,7 @@ class ForceLoop:
         """What is known of each axis, and what its watch reports."""
         own, run, forces, torques = self.parameters, self._run, self._axes.forces, self._measurement.torques
         q = self._pose
-        moved = q - (q if run.before is None else run.before)
+        moved = q - run.before
         run.before = q
         run.judge(q, self._measurement, forces, own.sensing.zero_limit)
         knowledge = self._knowledge
@@ -335,7 +336,7 @@ class ForceLoop:
             found += one.watch.step(axis, Seen(known, way, touched if is_touched else "", is_led), torques.now, own, dt)
         if run.is_touching and not any(event.holds for event in found):
             self._pressed_at = q
-        if run.free_at is None or not (contact.cover or run.is_touching):
+        if not (contact.cover or run.is_touching):
             run.free_at = q
         return found
 
@@ -406,7 +407,7 @@ class ForceLoop:
         run, q = self._run, self._pose
         torques = self._measurement.torques.now - run.resting
         is_elsewhere = any(event.holds and event.code is Code.UNEXPLAINED for event in found)
-        if not is_elsewhere or run.free_at is None or not torques.any():
+        if not is_elsewhere or not torques.any():
             return q
         away = torques * (math.hypot(*contact.force) / float(torques @ torques))
         return run.free_at + FORCE.way_back * away  # friction would hold it in less
@@ -419,9 +420,7 @@ class ForceLoop:
         is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_force for one in run.axes)
         if is_watching or not is_assessed:
             speeds = [0.0] * len(speeds)
-        run.delayed.append(speeds)
-        while len(run.delayed) > own.delay_samples + 1:
-            run.delayed.popleft()
+        run.delayed = [*run.delayed, speeds][-own.delay_samples - 1 :]
         late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)
         return [VelocityRow(one.now.along, speed) for one, speed in zip(run.axes, late, strict=True)]
 
@@ -543,23 +542,22 @@ class ForceLoop:
         """What the motions of a task do not reach, or a posture where it is all there is."""
         own, run = self.parameters, self._run
         if any(event.holds or event.code is Code.PUSHED for event in found):
-            run.joints = {name: MotionWatch() for name in run.joints}
-            for one in run.axes:
-                one.motion = MotionWatch()
+            run.motions.clear()
             return []
         lasting = FORCE.quarter * own.limits.settling_time
         events = []
-        for one in run.axes:
+        for i, one in enumerate(run.axes):
             axis = one.now
             if axis.of.kind in (AxisKind.POSITION, AxisKind.VELOCITY):
                 speed = axis.of.rate if axis.of.kind is AxisKind.POSITION else axis.of.value or 0.0
                 law = (own.task.largest_rate, own.task.fastest(axis.is_joint)[0])
                 goal = one.goal(axis, 0.0, math.inf)
-                events.append(one.motion.step(axis.of.name, axis.of.unit, goal, speed, axis.at, *law, lasting, dt))
+                events.append(run.motions[i].step(axis.of.name, axis.of.unit, goal, speed, axis.at, *law, lasting, dt))
         if not run.axes and posture is not None:
             law, rates = (own.posture_gain, own.joint_speed_limit), rate or [0.0] * len(self._q)
-            for (name, watch), goal, speed, at in zip(run.joints.items(), posture, rates, self._q, strict=True):
-                events.append(watch.step(name, "rad", goal, speed, at, *law, lasting, dt))
+            each = zip(self._body.arm.joints.names, posture, rates, self._q, strict=True)
+            for i, (name, goal, speed, at) in enumerate(each):
+                events.append(run.motions[i].step(name, "rad", goal, speed, at, *law, lasting, dt))
         return [event for event in events if event]
 
     def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
@@ -609,13 +607,13 @@ class ForceLoop:
 
 def _task(
     force: ForceCommand | None, task: TaskCommand | None, own: ForceLoopParameters
-) -> tuple[TaskCommand | None, object]:
+) -> tuple[TaskCommand | None, tuple[object, ...]]:
     """What is commanded as a task, and what makes it the same command as before, whatever its values are."""
     if task is not None:
         kept = (axis._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0) for axis in task.axes)
         return task, (TaskCommand, task.frame, *kept)
     if force is None or not any(force.force):
-        return None, None
+        return None, ()
     size = math.hypot(*force.force)
     x, y, z = (part / size for part in force.force)
     at: tuple[str, float | None] = pinned_position(force) or ("", None)
