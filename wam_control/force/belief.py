@@ -150,7 +150,7 @@ def belief(
     errors = predicted(axis, torques.sd, own, float(sensed.sense.dot(resting)), shaking)
     if sensed.force_sd == math.inf:
         return Belief(force, before, math.inf, 0.0, errors, tolerance(size, own))
-    sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)
+    sd = math.hypot(errors.torques, errors.friction, errors.place)
     chi2 = 0.0
     if desired:  # friction and position are known per force
         chi2 = sensed.unexplained(torques.now) / max(1.0, force / desired) ** 2

@@ -116,9 +116,7 @@ class ForceAxis(NamedTuple):
 
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no press along the direction explains."""
-        weighted = self.precision.dot(torques)
-        is_pressed = float(self.press.dot(weighted)) < 0.0
-        return _unexplained(self.precision, self.press, torques) if is_pressed else float(torques.dot(weighted))
+        return _unexplained(self.precision, self.press, torques, 0.0)
 
     def changed(self, change: Array) -> float:
         """The same of a change of the torques (n,), N m, at the same position."""
@@ -362,10 +360,10 @@ def _passive(weight: Array, press: Array, carried: Array, least: float) -> Array
     return passive
 
 
-def _unexplained(precision: Array, press: Array, torques: Array) -> float:
-    """chi^2 of torques (n,), N m, apart from the multiple of `press` that explains them best."""
+def _unexplained(precision: Array, press: Array, torques: Array, most: float = math.inf) -> float:
+    """chi^2 of torques (n,), N m, apart from the multiple of `press`, at most this, that explains them best."""
     weighted = precision.dot(torques)
-    force = float(press.dot(weighted))
+    force = min(float(press.dot(weighted)), most)
     return float(torques.dot(weighted)) - force * force / float(press.dot(precision).dot(press))
 
 

@@ -38,7 +38,7 @@ from wam_control.force.limits import (
     resolution,
     servo_yielding,
 )
-from wam_control.force.problem import VelocityRow, solve
+from wam_control.force.problem import VelocityRow, solve, unlimited
 from wam_control.force.stability_guard import GuardAssessment
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE
@@ -385,10 +385,10 @@ class ForceLoop:
         is_yielding = self._pushed.is_yielding or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
         if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
             low, high = accelerated(low, high, self._velocity.tolist(), own.limits.joint_acceleration * dt)
-        velocity, unlimited = solve(rows, wanted, least, low, high)
+        velocity, free = solve(rows, wanted, least, low, high)
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
-        if velocity is not unlimited:
-            limits += self._at_ends(unlimited, velocity)
+        if velocity is not free:
+            limits += self._at_ends(free, velocity)
         fed = self._fed(holds)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
             countered = dry_friction(self._body.arm, self._map, velocity.tolist())
@@ -473,8 +473,7 @@ class ForceLoop:
         for one in run.axes:
             axis = one.now
             if axis.is_force and axis.desired and axis.place and one.watch.touch.has_been and own.limits.impact:
-                far, still = [math.inf] * len(wanted), [row._replace(speed=0.0) for row in rows]
-                left = solve(still, wanted, [], [-math.inf] * len(wanted), far).velocity
+                left = unlimited([row._replace(speed=0.0) for row in rows], wanted)
                 wanted = followed(left, axis, self._body, self._pose, own)
         return wanted
 

@@ -61,20 +61,27 @@ def solve(
     least : one-sided rows.
     low, high : bounds (n,), rad/s, low <= high.
     """
-    rows = [row for row in rows if row.size > FORCE.shortest_lever]
+    rows, least = _used(rows), _used(least)
+    free = unlimited(rows, posture)
+    each = zip(low, free.tolist(), high)  # noqa: B905 - as long as each other
+    is_inside = all([slowest <= speed <= fastest for slowest, speed, fastest in each])  # noqa: C419 - a list takes half the time
+    if is_inside and all(along.dot(free) >= speed for along, speed in least):
+        return Solution(free, free)
+    return Solution(_limited(rows, posture, least, np.array(low), np.array(high)), free)
+
+
+def unlimited(rows: Sequence[VelocityRow], posture: Array) -> Array:
+    """The joint velocities (n,), rad/s, without limits; arguments as those of `solve`."""
+    rows = _used(rows)
     if len(rows) == 1:  # in closed form, so that one axis has the bits of its law
         along, speed = rows[0]
-        unlimited = posture + along * ((speed - along.dot(posture)) / along.dot(along))
-    elif rows:
-        unlimited = np.linalg.solve(*_normal(rows, posture))
-    else:
-        unlimited = posture
-    broken = [row for row in least if row.size > FORCE.shortest_lever]
-    each = zip(low, unlimited.tolist(), high)  # noqa: B905 - as long as each other
-    is_inside = all([slowest <= speed <= fastest for slowest, speed, fastest in each])  # noqa: C419 - a list takes half the time
-    if is_inside and all(along.dot(unlimited) >= speed for along, speed in broken):
-        return Solution(unlimited, unlimited)
-    return Solution(_limited(rows, posture, broken, np.array(low), np.array(high)), unlimited)
+        return posture + along * ((speed - along.dot(posture)) / along.dot(along))
+    return np.asarray(np.linalg.solve(*_normal(rows, posture)), np.float64) if rows else posture
+
+
+def _used(rows: Sequence[VelocityRow]) -> list[VelocityRow]:
+    """The rows along which something moves."""
+    return [row for row in rows if row.size > FORCE.shortest_lever]
 
 
 def _limited(
@@ -111,7 +118,6 @@ def _normal(rows: Sequence[VelocityRow], posture: Array) -> tuple[Array, Array]:
 def linear(rows: Sequence[Array], n: int) -> tuple[Array, Array]:
     """The solution without limits, v = M s + N p, for the guard: M (n, p) and N (n, n) of rows (n,)."""
     used = [VelocityRow(row, 0.0) for row in rows]
-    kept = [row for row in used if row.size > FORCE.shortest_lever]
-    hold = inverse(_normal(kept, np.zeros(n))[0])
+    hold = inverse(_normal(_used(used), np.zeros(n))[0])
     drive = [row.along * (RANK / row.size**2) if row.size > FORCE.shortest_lever else 0.0 * row.along for row in used]
     return hold @ np.array(drive).T, hold
