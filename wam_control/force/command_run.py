@@ -119,7 +119,7 @@ class Shaking:
             return 0.0
         lever, yielding = axis.along, 1.0 / own.guard.contact_stiffness
         return math.fsum(
-            2.0 * abs(lever @ x) / abs(yielding + lever @ receptance @ lever) for x, receptance in self._free
+            2.0 * abs(lever.dot(x)) / abs(yielding + lever.dot(receptance).dot(lever)) for x, receptance in self._free
         )
 
 
