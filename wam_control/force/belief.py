@@ -138,20 +138,17 @@ def belief(
     resting : torques at rest before (n,), N m, that no touched surface gives.
     shaking : as `predicted` has it.
     """
-    sensed, desired = axis.sensed, axis.desired
+    sensed, chi2 = axis.sensed, 0.0
     force, before = axis.force(torques.now), axis.force(torques.before)
     if sensed is None:
         sd = float(torques.sd[axis.of.joint])
         errors = Errors(torques=sd, resting=abs(float(resting[axis.of.joint])))
-        return Belief(force, before, sd, 0.0, errors, tolerance(size, own))
-    if torques.acceleration is not None and not is_touching:
-        # the acceleration is the mean of a period
-        force = before = 0.5 * (force + before) - float(sensed.carried.dot(torques.acceleration))
-    errors = predicted(axis, torques.sd, own, float(sensed.sense.dot(resting)), shaking)
-    if sensed.force_sd == math.inf:
-        return Belief(force, before, math.inf, 0.0, errors, tolerance(size, own))
-    sd = math.hypot(errors.torques, errors.friction, errors.place)
-    chi2 = 0.0
-    if desired:  # friction and position are known per force
-        chi2 = sensed.unexplained(torques.now) / max(1.0, force / desired) ** 2
+    else:
+        if torques.acceleration is not None and not is_touching:
+            # the acceleration is the mean of a period
+            force = before = 0.5 * (force + before) - float(sensed.carried.dot(torques.acceleration))
+        errors = predicted(axis, torques.sd, own, float(sensed.sense.dot(resting)), shaking)
+        sd = math.hypot(errors.torques, errors.friction, errors.place)
+        if axis.desired and sd < math.inf:  # friction and position are known per force
+            chi2 = sensed.unexplained(torques.now) / max(1.0, force / axis.desired) ** 2
     return Belief(force, before, sd, chi2, errors, tolerance(size, own))
