@@ -45,7 +45,13 @@ class ForceLaw:
 
     def __post_init__(self) -> None:
         for field in ("gain", "proportional_gain", "error_limit", "deadband"):
-            object.__setattr__(self, field, per_axis(f"{self.group}_{field}", getattr(self, field), self.names))
+            values, names = tuple(getattr(self, field)), self.names
+            require(
+                len(values) in (1, len(names)),
+                f"parameter '{self.group}_{field}' has {len(values)} values; give {len(names)}, one for each of "
+                f"{', '.join(names)}, or one for all",
+            )
+            object.__setattr__(self, field, values * len(names) if len(values) == 1 else values)
         for name, limit, deadband in zip(self.names, self.error_limit, self.deadband, strict=True):
             require(
                 limit > deadband,
@@ -58,10 +64,6 @@ class ForceLaw:
         limit = self.error_limit[axis]
         return min(max(error, -limit), limit)
 
-    def effective(self, axis: int, error: float) -> float:
-        """Error at the input of G_I, after saturation and deadband."""
-        return math.copysign(max(min(abs(error), self.error_limit[axis]) - self.deadband[axis], 0.0), error)
-
     def velocity(self, axis: int, error: float, before: float, dt: float) -> float:
         """Velocity of one axis.
 
@@ -72,7 +74,8 @@ class ForceLaw:
         before : the same set point minus the measurement of the period before.
         dt : period, s.
         """
-        velocity = self.gain[axis] * self.effective(axis, error)
+        effective = max(min(abs(error), self.error_limit[axis]) - self.deadband[axis], 0.0)
+        velocity = self.gain[axis] * math.copysign(effective, error)
         proportional = self.proportional_gain[axis]
         if proportional:
             velocity += proportional * (self.limited(axis, error) - self.limited(axis, before)) / dt
@@ -110,20 +113,3 @@ def _along(law: ForceLaw, axis: tuple[float, ...]) -> ForceLaw:
         (radius(law.error_limit),),
         (radius(law.deadband),),
     )
-
-
-def per_axis(field: str, given: Sequence[float], names: Sequence[str]) -> tuple[float, ...]:
-    """One value per axis, from as many or from one for all.
-
-    Raises
-    ------
-    ParameterError
-        where the number of values is another.
-    """
-    values = tuple(given)
-    require(
-        len(values) in (1, len(names)),
-        f"parameter '{field}' has {len(values)} values; give {len(names)}, one for each of {', '.join(names)}, "
-        "or one for all",
-    )
-    return values * len(names) if len(values) == 1 else values

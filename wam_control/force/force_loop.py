@@ -19,7 +19,7 @@ from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
-from wam_control.force.feed_forward import dry_friction
+from wam_control.force.feed_forward import dry_friction, force_torque
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -389,7 +389,7 @@ class ForceLoop:
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
         if velocity is not free:
             limits += self._at_ends(free, velocity)
-        fed = self._fed(holds)
+        fed = force_torque(run, holds, own)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
             countered = dry_friction(self._body.arm, self._map, velocity.tolist())
             friction = run.friction.step(countered, FORCE.friction_time, dt)
@@ -511,25 +511,6 @@ class ForceLoop:
                 values = {"angle": at, "end": end, "margin": own.limits.joint_margin}
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
-
-    def _fed(self, holds: bool) -> Array:
-        """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
-
-        The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
-        """
-        own, fed = self.parameters, np.zeros(len(self._q))
-        for one in self._run.axes:
-            axis = one.now
-            if axis.is_force and not holds:
-                fed += own.force_feedforward * axis.desired * axis.along
-            if self._run.is_touching and axis.is_force and axis.place is not None and not axis.is_joint:
-                if holds or not axis.place.is_known:
-                    one.wound_up = math.inf
-                    continue
-                if not math.isfinite(one.wound_up):
-                    one.wound_up = one.known.force * (own.is_estimated or one.wound_up == math.inf)
-                fed += ((1.0 - own.force_feedforward) * one.rising - one.wound_up) * axis.along
-        return fed
 
     def _watch_motions(
         self,
