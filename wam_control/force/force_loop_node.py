@@ -145,7 +145,7 @@ class ForceLoopNode:
         report, events = self._loop.report, self._loop.events
         refusals = self.refusals
         commanded = ""
-        if refusals or any(event.holds for event in events):  # of the command for which it was given
+        if refusals or self._loop.event.holds:  # of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             unit = " N" if command and not (torque or task) else ""

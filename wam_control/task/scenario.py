@@ -161,7 +161,7 @@ class ScenarioOutput(NamedTuple):
     failure: str
     commands_arm: bool  # in this step
     task: TaskCommand | None = None
-    rate: tuple[float, ...] = ()  # rad/s, of a posture that moves; empty where it is not known
+    rate: Sequence[float] = ()  # rad/s, of a posture that moves; empty where it is not known
 
 
 class Scenario:
@@ -199,7 +199,6 @@ class Scenario:
         self.steps, self._shared = list(steps), shared
         self._covers = shared.arm.covers if shared else None
         self._motion: Motion | None = None
-        self._rate: tuple[float, ...] = ()
         self._index = -1
         self._elapsed = 0.0
         self._posture: list[float] = []
@@ -224,19 +223,18 @@ class Scenario:
             self._elapsed += dt
             begins = self._advance(q, contact)
         step = self.steps[self._index]
-        self._rate = ()
+        rate: Sequence[float] = ()
         if self._motion is not None and not self.done:
             self._posture, rate = self._motion.at(self._elapsed)
-            self._rate = tuple(rate)
         push = step.push
-        pushing = push is not None and push.acts(self._elapsed, dt) and not self.done
+        acting = push if push and push.acts(self._elapsed, dt) and not self.done else None
         request = "disable" if self.failure else step.request
         return ScenarioOutput(
             posture=list(self._posture),
             force=NO_FORCE if self.done else self._force(step),
             push_cover=push.cover if push else "",
-            push_force=push.force if push and pushing else ZERO,
-            push_torque=push.torque(self._covers) if push and pushing else ZERO,
+            push_force=acting.force if acting else ZERO,
+            push_torque=acting.torque(self._covers) if acting else ZERO,
             request=request if begins else "",
             settings=step.settings if begins and not self.done else (),
             step=step.name,
@@ -245,7 +243,7 @@ class Scenario:
             failure=self.failure,
             commands_arm=step.commands_arm,
             task=None if self.done else step.task,
-            rate=self._rate,
+            rate=rate,
         )
 
     def _begin(self, index: int, q: Sequence[float]) -> None:
