@@ -56,8 +56,7 @@ class CommandAdmission:
         task: TaskCommand | None = None,
     ) -> None:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
-        pressed = bool(_size(self.force))
-        self.refusals = {}
+        before, self.refusals = self.force, {}
         if force is not None and 0.0 < _size(force) < FORCE.smallest_force:
             force = force._replace(force=ZERO)
         reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
@@ -75,7 +74,7 @@ class CommandAdmission:
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
         self._refuse_without_effect(own.mode, q, force, posture, torque, task)
         posture = None if self._is_ignored else posture
-        has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
+        has_ended = force is None and bool(_size(before))  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
         if posture is not None and not self._has_lapsed:
             self.posture = list(posture)

@@ -494,7 +494,7 @@ class ForceLoop:
         now = torques.now - run.resting
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._pose).dot(torques.acceleration)
-        chi2 = max((one.known.chi2 for one in run.axes), default=0.0)
+        chi2 = max([one.known.chi2 for one in run.axes], default=0.0)
         gain = self._supervision.present * max(own.force_gain)
         return self._pushed.step(
             self._pose, forces, now, torques.sd, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt

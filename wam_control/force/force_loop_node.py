@@ -76,15 +76,15 @@ class ForceLoopNode:
         given = ForceInput(
             joints,
             inputs.dt,
-            sensors=inputs["joint_sensors"],
-            contact=contact_of(hypotheses, self._covers) if external and hypotheses else None,
-            external=external.effort if external else None,
-            external_sd=torque_sd.effort if torque_sd else None,
-            command=ForceCommand(command.frame, command.force, command.torque) if command else None,
-            posture=posture.position if posture else None,
-            rate=posture.velocity if posture else None,
-            torque=torque.effort if torque else None,
-            task=task,
+            inputs["joint_sensors"],
+            contact_of(hypotheses, self._covers) if external and hypotheses else None,
+            external.effort if external else None,
+            torque_sd.effort if torque_sd else None,
+            ForceCommand(command.frame, command.force, command.torque) if command else None,
+            posture.position if posture else None,
+            posture.velocity if posture else None,
+            torque.effort if torque else None,
+            task,
         )
         out = self._loop.step(given)
         return {

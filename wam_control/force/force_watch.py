@@ -297,7 +297,8 @@ class MotionWatch:
     """Whether a joint or an axis follows its goal as well as an ideal one with the same speed limit and gain."""
 
     def __init__(self) -> None:
-        self._ideal, self._late = math.nan, Lasting()
+        self._ideal: float | None = None
+        self._late = Lasting()
 
     def step(
         self,
@@ -322,15 +323,14 @@ class MotionWatch:
         lasting : time after which it is reported, s.
         dt : s.
         """
-        if math.isnan(self._ideal):
-            self._ideal = at
-        speed = min(max(rate + gain * (goal - self._ideal), -fastest), fastest)
-        self._ideal += speed * dt
+        ideal = at if self._ideal is None else self._ideal
+        speed = min(max(rate + gain * (goal - ideal), -fastest), fastest)
+        self._ideal = ideal = ideal + speed * dt
         if abs(rate) > fastest:
             return warning(Code.AT_LIMIT, "speed", axis=name, unit=unit, speed=abs(rate), allowed=fastest)
         # behind by the time constant of its law while it moves, and by as much as an arm at rest may be
-        allowed = MOTION.arrived + (abs(speed) / gain if gain else 0.0) + abs(goal - self._ideal) * FORCE.quarter
-        if not self._late.step(abs(at - self._ideal) > allowed, lasting, lasting, dt):
+        allowed = MOTION.arrived + (abs(speed) / gain if gain else 0.0) + abs(goal - ideal) * FORCE.quarter
+        if not self._late.step(abs(at - ideal) > allowed, lasting, lasting, dt):
             return None
         return warning(
             Code.NOT_REACHED,
