@@ -23,7 +23,7 @@ from wam_control.force.limits import (
 from wam_description.signals import ZERO, Contact
 from wam_description.transmission_map import TransmissionMap
 
-JOINTS, DT = WAM.joints, 0.005
+JOINTS, STILL, DT = WAM.joints, [0.0] * 4, 0.005
 MOTORS = replace(OWN, feedback="contact_estimate")
 STIFF_SERVO = TransmissionMap.of(WAM).at_joints(CONFIGURATION.shared.servo.integral_gain)
 LOWER, UPPER = np.array(JOINTS.lower), np.array(JOINTS.upper)
@@ -38,7 +38,7 @@ def test_no_joint_comes_nearer_to_its_end_than_allowed_however_it_is_driven() ->
     for seed in range(10):
         q, sign = random.uniform(LOWER + 0.1, UPPER - 0.1), 1.0 if seed % 2 else -1.0
         for _ in range(1500):
-            low, high = map(np.array, joint_bounds(q.tolist(), JOINTS, OWN))
+            low, high = map(np.array, joint_bounds(q.tolist(), JOINTS, OWN, STILL, math.inf))
             assert (low <= high).all()
             assert max(abs(low).max(), abs(high).max()) <= OWN.joint_speed_limit
             q = q + (high if sign > 0 else low) * DT
@@ -49,12 +49,12 @@ def test_no_joint_comes_nearer_to_its_end_than_allowed_however_it_is_driven() ->
 def test_a_joint_beyond_its_end_is_brought_back_slowly() -> None:
     q = UPPER + 0.2
     for _ in range(2000):
-        low, high = map(np.array, joint_bounds(q.tolist(), JOINTS, OWN))
+        low, high = map(np.array, joint_bounds(q.tolist(), JOINTS, OWN, STILL, math.inf))
         assert (low <= high).all()
         assert (high >= -0.3).all()
         q = q + high * DT
     assert q == pytest.approx(UPPER, abs=1e-3)
-    free = joint_bounds((UPPER + 0.2).tolist(), JOINTS, limited(joint_gain=0.0))
+    free = joint_bounds((UPPER + 0.2).tolist(), JOINTS, limited(joint_gain=0.0), STILL, math.inf)
     assert set(free[1]) == {OWN.joint_speed_limit}, "ends that are not watched"
 
 

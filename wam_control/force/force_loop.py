@@ -30,7 +30,6 @@ from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
 from wam_control.force.knowledge import Knowledge
 from wam_control.force.limits import (
-    accelerated,
     approach_speed,
     calm,
     followed,
@@ -381,10 +380,10 @@ class ForceLoop:
             if rate is None:
                 wanted = self._slowed(rows, wanted)
         least = self._pushes(forces, contact, holds, allowed, dt)
-        low, high = joint_bounds(self._q, self._body.arm.joints, own)
-        is_yielding = self._pushed.is_yielding or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
-        if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
-            low, high = accelerated(low, high, self._velocity.tolist(), own.limits.joint_acceleration * dt)
+        step = own.limits.joint_acceleration * dt or math.inf
+        if self._pushed.is_yielding or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes):
+            step = math.inf  # a stiff hand would make a late arm swing
+        low, high = joint_bounds(self._q, self._body.arm.joints, own, self._velocity.tolist(), step)
         velocity, free = solve(rows, wanted, least, low, high)
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
         if velocity is not free:

@@ -13,28 +13,24 @@ from wam_description.parts import Joints
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.small_matrices import length
 
-Bounds = tuple[list[float], list[float]]
 
+def joint_bounds(
+    q: Sequence[float], joints: Joints, own: ForceLoopParameters, before: Sequence[float], step: float
+) -> tuple[list[float], list[float]]:
+    """Least and largest velocity of each joint (n,), rad/s: its speed limit, and a velocity damper at its ends.
 
-def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -> Bounds:
-    """Least and largest velocity of each joint (n,), rad/s: its speed limit, and a velocity damper at its ends."""
+    Within these, no velocity is further than a step from the one before (n,), rad/s.
+    """
     gain, margin, speed = own.limits.joint_gain, own.limits.joint_margin, own.joint_speed_limit
-    if not gain:
-        return [-speed] * len(q), [speed] * len(q)
 
     def towards(distance: float) -> float:
-        fastest = gain * (distance - margin)
+        fastest = gain * (distance - margin) if gain else speed
         if fastest >= speed:  # as most joints are: far from their ends
             return speed
         return max(fastest, 0.0) if distance >= 0.0 else max(gain * distance, -FORCE.push_back)
 
-    low = [-towards(at - lower) for lower, at in zip(joints.lower, q, strict=True)]
-    return low, [towards(upper - at) for upper, at in zip(joints.upper, q, strict=True)]
-
-
-def accelerated(low: Sequence[float], high: Sequence[float], before: Sequence[float], step: float) -> Bounds:
-    """Bounds (n,), rad/s, within a step of the velocities before (n,), rad/s; those of the speed come first."""
-    each = list(zip(low, high, before, strict=True))
+    ends = zip(joints.lower, q, joints.upper, before, strict=True)
+    each = [(-towards(at - lower), towards(upper - at), last) for lower, at, upper, last in ends]
     return [_within(v - step, a, b) for a, b, v in each], [_within(v + step, a, b) for a, b, v in each]
 
 
