@@ -28,14 +28,12 @@ class ForceLoopNode:
     def __init__(self, shared: Shared, own: ForceLoopParameters) -> None:
         self._loop = ForceLoop(shared.model_arm, shared.servo, own, shared.timing, shared.ages.command)
         self.tune = self._loop.tune
-        self._arm = shared.arm
+        self._shared = shared
         self._player = TrajectoryPlayer(shared.arm, shared.motion)
         self._is_on_trajectory = False
         self._command: Table | None = None
         self._known: TaskCommand | None = None
         self._refusal = ""
-        self._covers = shared.arm.covers.names
-        self._timing = shared.timing
         self._reported: tuple[Any, ...] | None = None
         self._event = OBEYED
 
@@ -77,7 +75,7 @@ class ForceLoopNode:
             joints,
             inputs.dt,
             inputs["joint_sensors"],
-            contact_of(hypotheses, self._covers) if external and hypotheses else None,
+            contact_of(hypotheses, self._shared.arm.covers.names) if external and hypotheses else None,
             external.effort if external else None,
             torque_sd.effort if torque_sd else None,
             ForceCommand(command.frame, command.force, command.torque) if command else None,
@@ -110,7 +108,7 @@ class ForceLoopNode:
         if command != self._command:
             self._command, self._refusal = command, ""
             try:
-                self._known = task_of(command, self._arm)
+                self._known = task_of(command, self._shared.arm)
             except ParameterError as error:
                 self._known, self._refusal = None, f"{error}; the arm holds its position"
         return self._known
@@ -126,7 +124,7 @@ class ForceLoopNode:
         event, before = self._loop.event, self._event
         self._event = event
         is_same = event is before or event.subject == before.subject
-        if is_same and not self._timing.is_display(stamp):
+        if is_same and not self._shared.timing.is_display(stamp):
             return {}
         if out.rows:
             return {"force_axis": Table(BASE, ()), "task_axes": Table(out.frame, out.rows)}
