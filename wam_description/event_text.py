@@ -141,7 +141,7 @@ SENTENCES: Final = {  # by cause
     "{model}",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
-    "command_stale": "command stale: {age_ms:.0f} ms old; allowed: {allowed_ms:.0f} ms; {cure}",
+    "command_stale": "command stale: {age_ms:b} ms old; allowed: {allowed_ms:g} ms; {cure}",
     "node_late": "the {what} itself did not run for {time:.2f} s; allowed: {allowed:g} s; {cure}",
     "held_up": "the driver itself did not run for {time:.2f} s; allowed: {allowed:g} s; {step}: make the steps of "
     "that node faster, or run it in its own process",
@@ -203,7 +203,8 @@ def _digits(values: Mapping[str, Any]) -> int:
     """Of brief numbers: what is above an allowed number is written so that it is seen."""
     if "value" in values:
         return max(3, digits_apart(values["value"], values["allowed"]))
-    value, allowed = values.get("error", values.get("force")), values.get("allowed")
+    value = values.get("error", values.get("force", values.get("age_ms")))
+    allowed = values.get("allowed", values.get("allowed_ms"))
     return 2 if value is None or allowed in (None, value) else digits_apart(value, allowed)
 
 

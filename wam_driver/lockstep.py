@@ -177,7 +177,7 @@ class Lockstep:
         if missing := self.missing:
             return Answer(False, f"refused: still waiting for {' and '.join(missing)}")
         self._one_period()
-        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp} ns")
+        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp / 1e9:.3f} s")
 
     def facts(self) -> dict[str, str]:
         """For the diagnostics: the pace, where it is one; without a pace nothing depends on the wall clock."""

@@ -155,7 +155,7 @@ class Realtime:
             return Answer(False, "refused: the driver is running; call pause first")
         self._driver.advance(0.0)
         self._send()
-        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp} ns")
+        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp / 1e9:.3f} s")
 
     def facts(self) -> dict[str, str]:
         """For the diagnostics: latencies since the last report, late periods and rate since the start."""
