@@ -12,13 +12,15 @@ from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.event import Value, fault
 from wam_description.mismatch import ModelMismatch, true_arm
-from wam_description.parameters import parameter
+from wam_description.mjcf import rotation_xyz
+from wam_description.parameters import parameter, require
 from wam_description.signals import BASE, NO_LOAD, ZERO, Answer, Load, Point, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
 from wam_driver.imperfections import AmplifierParameters, SensorParameters
 from wam_driver.limit_watch import LimitWatch, excess
+from wam_driver.loads import sprung_cover
 from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import Sensors
@@ -73,6 +75,24 @@ class DriverSample(NamedTuple):
     actual: list[float]
 
 
+def _require_springs(arm: Arm, world: World) -> None:
+    """Refuse a spring on a link without a cover, or beyond the ends of it: no message could give its force."""
+    for spring in world.springs.present:
+        cover = sprung_cover(arm, spring.joint)
+        covered = ", ".join(joint for joint in arm.joints.names if sprung_cover(arm, joint))
+        require(
+            cover is not None,
+            f"world.springs acts on {spring.joint}, whose link has no cover, so that sim/contact could not contain its "
+            f"force; allowed: {covered}, or give the link a cover in arm.covers",
+        )
+        place = float(rotation_xyz(*cover.rotation)[:, 0] @ (np.array([spring.lever, 0.0, 0.0]) - cover.origin))
+        require(
+            -DRIVER.rounding <= place <= cover.length + DRIVER.rounding,
+            f"world.springs.lever is {spring.lever:g} m for {spring.joint}: the spring would push at {place:.4g} m of "
+            f"{cover.name}; allowed: 0 to {cover.length:g} m of it",
+        )
+
+
 class Driver:
     """Steps the plant with the last valid command, as long as it is safe to do so.
 
@@ -102,6 +122,7 @@ class Driver:
             parameters.friction,
             parameters.brake_torque,
         )
+        _require_springs(arm, parameters.world)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
         # packed: objects that live so long drive those in use out of the processor's caches (benchmarks/README.md)

@@ -14,8 +14,7 @@ from mujoco import mj_applyFT
 
 from wam_description.arm import Arm
 from wam_description.contact_pairs import folded
-from wam_description.mjcf import rotation_xyz
-from wam_description.parameters import require, rows
+from wam_description.parameters import rows
 from wam_description.signals import Load
 from wam_description.small_matrices import cross
 from wam_description.world import Springs
@@ -238,23 +237,14 @@ def half_lengths(model: Any, geom: int) -> np.ndarray:
 
 
 def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:
-    """The springs; one on a link without a cover, or beyond the ends of it, is refused: no message gives its force."""
     tendons = range(2 * len(arm.motors.names), model.ntendon)  # after the strands of the cables
-    links = dict(zip(arm.joints.names, arm.links.names, strict=True))
-    covers = {cover.link: cover for cover in rows(arm.covers)[::-1]}
     for tendon, spring in zip(tendons, springs.present, strict=True):
-        link, covered = links[spring.joint], ", ".join(joint for joint in links if links[joint] in covers)
-        require(
-            link in covers,
-            f"world.springs acts on {spring.joint}, whose link {link} has no cover, so that sim/contact could not "
-            f"contain its force; allowed: {covered}, or give the link a cover in arm.covers",
-        )
-        cover = covers[link]
-        place = float(rotation_xyz(*cover.rotation)[:, 0] @ (np.array([spring.lever, 0.0, 0.0]) - cover.origin))
-        require(
-            -PLANT.rounding <= place <= cover.length + PLANT.rounding,
-            f"world.springs.lever is {spring.lever:g} m for {spring.joint}: the spring would push at {place:.4g} m of "
-            f"{cover.name}; allowed: 0 to {cover.length:g} m of it",
-        )
-        rest = spring.lever * spring.rest
-        yield SpringOnCover(tendon, cover.name, spring.lever, rest, spring.bilateral)
+        if cover := sprung_cover(arm, spring.joint):
+            rest = spring.lever * spring.rest
+            yield SpringOnCover(tendon, cover.name, spring.lever, rest, spring.bilateral)
+
+
+def sprung_cover(arm: Arm, joint: str) -> Any:
+    """The first cover of the link of a joint; None where it has none."""
+    link = arm.links.names[arm.joints.names.index(joint)]
+    return next((cover for cover in rows(arm.covers) if cover.link == link), None)

@@ -22,7 +22,6 @@ class PlantThresholds:
     # of the sharing between the ends of a tube: energy is conserved to 0.2 %, and depths within 2 % count as equal
     sharpness: int = 32
     smallest_depth: float = 1e-12  # m
-    rounding: float = 1e-9  # m, of a contact position
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +38,7 @@ class DriverThresholds:
 
     recent: float = 0.2  # s, for which a push that has ended may be the cause of what the arm does
     status_period: float = 0.05  # s, between repetitions of the status in realtime, so that every node knows the brakes
+    rounding: float = 1e-9  # m, of a contact position
     warning: float = 0.9  # of a limit
     leeway: float = 0.05  # rad, by which an arm that was enabled beyond a stop may go on before it is stopped again
     watch: float = 0.02  # s between two looks at the progress
