@@ -33,13 +33,13 @@ def lateral(q: Sequence[float]) -> Array:
 
 
 def axis_of(q: Sequence[float], direction: Array, force: float = 10.0, at: float = 0.28, sd: float = 0.0) -> ForceAxis:
-    return ForceAxes(WAM, BODY, SENSING).axis(q, PressedForce(OUTER, at, sd, direction, force))
+    return ForceAxes(BODY, SENSING).axis(q, PressedForce(OUTER, at, sd, direction, force))
 
 
 def test_at_every_pose_a_force_is_sensed_without_shrinkage_and_as_a_passive_arm() -> None:
     random, lightest = np.random.default_rng(4), math.inf
-    forces = ForceAxes(WAM, BODY, SENSING)
-    loose = ForceAxes(WAM, BODY, replace(SENSING, least_apparent_mass=0.0))
+    forces = ForceAxes(BODY, SENSING)
+    loose = ForceAxes(BODY, replace(SENSING, least_apparent_mass=0.0))
     for _ in range(300):
         q = random.uniform(WAM.joints.lower, WAM.joints.upper)
         direction = random.normal(size=3)
@@ -88,10 +88,10 @@ def test_a_force_is_known_worse_the_less_is_known(q: tuple[float, ...]) -> None:
     direction = lateral(q)
     by_position = [axis_of(q, direction, sd=sd).force_sd for sd in (0.0, 0.01, 0.03, 0.1)]
     assert all(b > a for a, b in pairwise(by_position))
-    more = ForceAxes(WAM, BODY, replace(SENSING, friction=2.0 * SENSING.friction))
+    more = ForceAxes(BODY, replace(SENSING, friction=2.0 * SENSING.friction))
     pressed = PressedForce(OUTER, 0.28, 0.01, direction, 10.0)
     assert more.axis(q, pressed).force_sd > axis_of(q, direction, sd=0.01).force_sd
-    forces = ForceAxes(WAM, BODY, SENSING)
+    forces = ForceAxes(BODY, SENSING)
     other = forces.disturbance(q, PressedForce("inner_link", 0.3, 0.01, direction, 10.0))
     assert forces.axis(q, pressed, other).force_sd > forces.axis(q, pressed).force_sd
 
@@ -100,6 +100,6 @@ def test_torques_of_the_force_alone_are_explained_and_others_are_not() -> None:
     q = POSES[0]
     axis = axis_of(q, lateral(q), sd=0.01)
     assert axis.unexplained(-7.0 * axis.press) == pytest.approx(0.0, abs=1e-6)
-    other = ForceAxes(WAM, BODY, SENSING).lever(q, "inner_link", 0.4, BODY.cover_pose(q, "inner_link").rotation[:, 1])
+    other = ForceAxes(BODY, SENSING).lever(q, "inner_link", 0.4, BODY.cover_pose(q, "inner_link").rotation[:, 1])
     assert axis.unexplained(-7.0 * axis.press - 12.0 * other) > 16.0
     assert axis.error(np.full(4, 0.1)) == pytest.approx(0.1 * np.linalg.norm(axis.sense))

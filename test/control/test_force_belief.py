@@ -18,11 +18,12 @@ from wam_control.force.force_axis import ForceAxes, Phasors, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import yielding
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
+from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
 OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 PLAIN = replace(OWN, sensing=replace(OWN.sensing, torque_fraction=0.0))
-FORCES, OUTER = ForceAxes(WAM, BODY, PLAIN.sensing), "outer_link"
+FORCES, OUTER = ForceAxes(BODY, PLAIN.sensing), "outer_link"
 POSES = ((0.3, -1.2, 0.2, 1.0), (0.0, -1.0, 0.0, 1.2), (0.5, 0.2, -0.4, 0.8))
 SD = np.full(4, OWN.sensing.torque_sd)
 NONE = np.zeros(4)
@@ -32,7 +33,7 @@ def axis_at(q: Sequence[float], force: float = 10.0, sd: float = 0.01) -> Comman
     direction = BODY.cover_pose(q, OUTER).rotation[:, 2].tolist()
     of = TaskAxis(AxisKind.FORCE, -1, OUTER, 0.28, tuple(direction), force)
     place = ForcePlace(OUTER, 0.28, sd, is_pinned=True, is_known=True)
-    return TaskAxes(WAM, BODY, FORCES).of(q, TaskCommand("base", (of,)), [place], [1.0])[0]
+    return TaskAxes(BODY, FORCES).of(q, TaskCommand("base", (of,)), [place], [1.0])[0]
 
 
 def errors(q: Sequence[float], force: float, sd: float = 0.01, **more: float) -> Errors:
@@ -122,7 +123,7 @@ def test_torques_at_rest_count_as_the_force_that_they_look_like() -> None:
 
 def test_a_joint_torque_is_known_as_its_joint_is() -> None:
     task = TaskCommand("base", joint_axes(AxisKind.FORCE, [1.0, 2.0, 0.0, -3.0]))
-    axes = TaskAxes(WAM, BODY, FORCES).of(POSES[0], task, [ForcePlace("", 0.0, 0.0)] * 4, [1.0] * 4)
+    axes = TaskAxes(BODY, FORCES).of(POSES[0], task, [ForcePlace("", 0.0, 0.0)] * 4, [1.0] * 4)
     torques = WorldTorques(np.array([0.5, -2.0, 0.0, 3.0]), NONE, None, np.array([0.1, 0.2, 0.3, 0.4]))
     resting = np.array([0.0, 0.1, 0.0, 0.0])
     known = [belief(axis, 4.0, torques, PLAIN, False, resting, 0.0) for axis in axes]
@@ -143,7 +144,7 @@ def test_a_stiff_surface_yields_as_the_cables_do() -> None:
 @pytest.mark.parametrize("stiffness", [400.0, 2e4, 6e4, 3e5])
 def test_what_shakes_the_free_arm_shakes_it_on_a_surface(q: tuple[float, ...], stiffness: float) -> None:
     """Links on the cables, and motors on their velocity loops, as one system of both; without dry friction."""
-    forces = ForceAxes(replace(WAM, joints=replace(WAM.joints, dynamic_friction=(0.0,) * 4)), BODY, PLAIN.sensing)
+    forces = ForceAxes(RigidBody(replace(WAM, joints=replace(WAM.joints, dynamic_friction=(0.0,) * 4))), PLAIN.sensing)
     shared, dt, frequency = CONFIGURATION.shared, 0.005, 2.0 * math.pi * 25.0
     at_joints = TransmissionMap.of(WAM).at_joints
     cables, servo = at_joints([circuit.stiffness for circuit in WAM.circuits]), shared.servo

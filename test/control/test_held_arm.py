@@ -58,7 +58,7 @@ class Pushed:
 @pytest.mark.parametrize("shift", [0.002, 0.02, 0.3])
 def test_an_arm_that_holds_goes_back_to_where_it_held_with_no_more_energy_than_an_allowed_impact(shift: float) -> None:
     own = replace(HOLDS, limits=replace(HOLDS.limits, joint_acceleration=0.0))
-    arm, inertia = Pushed(own, 5.0), ForceAxes(ARM, BODY, own.sensing).moved_inertia(np.add(POSE, shift))
+    arm, inertia = Pushed(own, 5.0), ForceAxes(BODY, own.sensing).moved_inertia(np.add(POSE, shift))
     arm.go(3 * DT)
     assert arm.q == list(POSE)
     for _ in range(2):  # and not to where it was a period ago

@@ -13,7 +13,6 @@ from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import UNTURNED, Angles, ForceAxes, ForceAxis, PressedForce
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
-from wam_description.arm import Arm
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import BASE
 
@@ -69,13 +68,12 @@ class TaskAxes:
 
     Parameters
     ----------
-    arm : the arm as the controller knows it.
     body : its kinematics and dynamics.
     forces : how forces are sensed.
     """
 
-    def __init__(self, arm: Arm, body: RigidBody, forces: ForceAxes) -> None:
-        self._arm, self._body, self.forces = arm, body, forces
+    def __init__(self, body: RigidBody, forces: ForceAxes) -> None:
+        self._body, self.forces = body, forces
 
     def of(
         self, q: Angles, task: TaskCommand, places: Sequence[ForcePlace], sides: Sequence[float]
@@ -95,10 +93,9 @@ class TaskAxes:
             for axis, side in zip(task.axes, sides, strict=True)
         ]
         in_frame = [sign * np.array(axis.direction) for axis, sign in zip(task.axes, signs, strict=True)]
-        directions = [rotation.dot(one) for one in in_frame]
         pressed = [
-            place.pressed(direction, _size(axis))
-            for axis, place, direction in zip(task.axes, places, directions, strict=True)
+            place.pressed(rotation.dot(along), _size(axis))
+            for axis, place, along in zip(task.axes, places, in_frame, strict=True)
         ]
         is_alone = len(pressed) == 1
         torques = [[] if is_alone else self._disturbance(q, *one) for one in zip(task.axes, pressed, strict=True)]
@@ -130,7 +127,7 @@ class TaskAxes:
         if axis.joint >= 0:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
             return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, float(q[axis.joint]))
-        point = np.array([place.position, *self._arm.covers.aside(place.cover, place.position)])
+        point = np.array([place.position, *self.forces.covers.aside(place.cover, place.position)])
         at = float(direction.dot(self._body.point(q, place.cover, point)))
         if not axis.is_sensed:
             along: Array = direction.dot(self._body.point_jacobian(q, place.cover, point))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.thresholds import FORCE
-from wam_description.arm import Arm, Servo
+from wam_description.arm import Servo
 from wam_description.parameters import parameter
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.small_matrices import inverse, length, outer
@@ -145,7 +145,6 @@ class ForceAxes:
 
     Parameters
     ----------
-    arm : the arm as the controller knows it.
     body : its kinematics and dynamics.
     parameters : of sensing.
 
@@ -154,7 +153,8 @@ class ForceAxes:
     covers : of the arm.
     """
 
-    def __init__(self, arm: Arm, body: RigidBody, parameters: SensingParameters) -> None:
+    def __init__(self, body: RigidBody, parameters: SensingParameters) -> None:
+        arm = body.arm
         self._body, self.covers, self._parameters = body, arm.covers, parameters
         self._map = TransmissionMap.of(arm)
         self._armature = np.diag(arm.joints.armature)

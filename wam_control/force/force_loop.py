@@ -151,7 +151,7 @@ class ForceLoop:
         parameters.require_fit(arm)
         self._supervision = Supervision(arm, self._servo, self._timing, parameters, tuple(self._q))
         self.parameters = self._supervision.parameters
-        self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, parameters.sensing_fed_back))
+        self._axes = TaskAxes(self._body, ForceAxes(self._body, parameters.sensing_fed_back))
 
     @property
     def event(self) -> Event:

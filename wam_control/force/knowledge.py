@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,10 @@ from wam_control.force.thresholds import FORCE
 from wam_description.signals import Contact
 
 
-class Knowledge:
+class Knowledge(NamedTuple):
     """What is known in one period of the forces of a command.
 
-    Parameters
+    Attributes
     ----------
     run : of the command.
     torques : of the world on the joints.
@@ -26,8 +27,10 @@ class Knowledge:
     own : parameters of the force loop.
     """
 
-    def __init__(self, run: CommandRun, torques: WorldTorques, forces: ForceAxes, own: ForceLoopParameters) -> None:
-        self._run, self._torques, self._forces, self._own = run, torques, forces, own
+    run: CommandRun
+    torques: WorldTorques
+    forces: ForceAxes
+    own: ForceLoopParameters
 
     def among(self, q: Angles, axes: Sequence[CommandedAxis], contact: Contact) -> Links:
         """The same axis on each link that may be touched, with the probability of that, the largest first.
@@ -37,10 +40,10 @@ class Knowledge:
         able = [axis for axis in axes if axis.sensed and axis.sensed.force_sd < math.inf]
         if len(able) < 2:
             return [(1.0, (able or axes)[0])]
-        torques, logs = self._torques.now, []
+        torques, logs = self.torques.now, []
         for axis in able:
             assert axis.place is not None
-            there = self._forces.axis(q, axis.place.pressed(axis.direction, axis.force(torques)))
+            there = self.forces.axis(q, axis.place.pressed(axis.direction, axis.force(torques)))
             chance = contact.probability
             if axis.place.cover != contact.cover:
                 chance = (1.0 - chance) / (len(axes) - 1)
@@ -65,17 +68,17 @@ class Knowledge:
         known, place = self._as_placed(axis), axis.place
         if place is None or place.is_pinned or known.force >= axis.desired or place.is_touched:
             return known
-        if abs(float(axis.direction.dot(self._forces.link_axis(q, place.cover)))) > STEEPEST:
+        if abs(float(axis.direction.dot(self.forces.link_axis(q, place.cover)))) > STEEPEST:
             return known  # nor will it be known
         # all but what no torque shows will be known, and the better the harder the arm presses
         sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
-        place = place._replace(position_sd=max(sd, self._own.contact_position_sd))
-        touched = axis._replace(sensed=self._forces.axis(q, place.pressed(axis.direction, axis.desired)))
+        place = place._replace(position_sd=max(sd, self.own.contact_position_sd))
+        touched = axis._replace(sensed=self.forces.axis(q, place.pressed(axis.direction, axis.desired)))
         return known._replace(errors=self._as_placed(touched).errors)
 
     def _as_placed(self, axis: CommandedAxis) -> Belief:
         """What is known of a force whose place is known as well as the axis has it."""
-        own, run, torques, size = self._own, self._run, self._torques, abs(axis.desired)
+        own, run, torques, size = self.own, self.run, self.torques, abs(axis.desired)
         if axis.is_joint:  # the torques of the joints are one vector
             size = math.hypot(*(one.now.desired for one in run.axes if one.now.is_joint))
         if own.is_estimated and axis.sensed is not None and not run.is_touching:

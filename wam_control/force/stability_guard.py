@@ -182,7 +182,7 @@ class StabilityGuard:
         self.parameters = parameters
         self._arm, self._timing = arm, timing
         self._loop = SampledLoop(arm, timing, servo)
-        self._force_axes = ForceAxes(arm, self._loop.body, sensing)
+        self._force_axes = ForceAxes(self._loop.body, sensing)
         self._whole = arm, servo, timing, parameters, sensing
 
     def __eq__(self, other: object) -> bool:
