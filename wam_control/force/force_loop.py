@@ -131,7 +131,7 @@ class ForceLoop:
         self._pushed = PushedArm(self._body)
         self._velocity, self._q = np.zeros(len(arm.joints.names)), list[float]()
         self._pose = self._velocity  # the same angles as an array
-        self._pressed_at: Array | None = None
+        self._pressed_at = self._pose + math.inf
         self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self.tune(parameters)
@@ -206,8 +206,7 @@ class ForceLoop:
     @property
     def _has_left(self) -> bool:
         """Whether the arm has moved away from where it last pressed on something."""
-        at = self._pressed_at
-        return at is None or bool(np.abs(at - self._pose).max() > MOTION.left_angle)
+        return bool(np.abs(self._pressed_at - self._pose).max() > MOTION.left_angle)
 
     def step(self, given: ForceInput) -> ForceOutput:
         """One outer period: the axes of what is commanded, then what is known of them, then the motion, then events."""

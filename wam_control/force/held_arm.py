@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -36,7 +38,7 @@ class PushedArm:
         self.event: Event | None = None
         self._since = math.inf  # s, since the last time
         self._allowed = 0.0  # N
-        self._from: Array | None = None  # (3,) m, of the tool, where the push began
+        self._from = np.zeros(3)  # m, of the tool, where the push began
 
     @property
     def is_yielding(self) -> bool:
@@ -96,7 +98,7 @@ class PushedArm:
         if not certain:
             return []
         tool = self._body.tool_pose(q).position
-        if is_new or self._from is None:
+        if is_new:
             self._from = tool
         if length(tool - self._from) > own.limits.free_travel:
             return []
