@@ -184,9 +184,26 @@ class ContactFit:
     def __init__(
         self, start: Sequence[float], end: Sequence[float], radius: Sequence[float], parameters: InferenceParameters
     ) -> None:
-        self._given, self._radius, self._ends = parameters, list(radius), list(zip(start, end, strict=True))
-        # logs of the frequency of contacts per metre
-        self._frequency = [math.log(w / (b - a)) for (a, b), w in zip(self._ends, parameters.weights, strict=True)]
+        self._given, self._ends = parameters, list(zip(start, end, strict=True))
+        self._precision = parameters.force_scale**-2
+        # places where the size of the force is tried
+        self._tried = [[a + (b - a) * part for part in (1 / 6, 1 / 2, 5 / 6)] for a, b in self._ends]
+        # moment arms, m, of a force about the axis by its line and by its friction around the tube
+        self._arms = [(parameters.moment_arm_offset * r, parameters.friction * r) for r in radius]
+        # logs of the frequency of contacts per metre, along the links and where they meet
+        self._frequency = [_log(w / (b - a)) for (a, b), w in zip(self._ends, parameters.weights, strict=True)]
+        self._end_frequency, half = _log(parameters.end_weight / CONTACT.end_length), 0.5 * CONTACT.end_length
+        last = len(self._ends) - 1
+        self._meeting = [[a + half] * (i > 0) + [b - half] * (i < last) for i, (a, b) in enumerate(self._ends)]
+        # of a force along the last link: the force across per force along, the moment arm, m, of the latter, position
+        # and width, m, and the log of the frequency
+        (a, b), slopes = self._ends[-1], CONTACT.end_slopes
+        pieces = [(0.0, math.sqrt(0.5) * radius[-1], a + 0.5 * (b - a), b - a, 1)]
+        pieces += [(slope, 0.0, b, CONTACT.end_length, len(slopes)) for slope in slopes]
+        self._along_pieces = [
+            (lean, arm, x, width, _log(parameters.along_weight / (count * width)))
+            for lean, arm, x, width, count in pieces
+        ]
         steps = (np.arange(parameters.positions) + 0.5) / parameters.positions  # the middle of each
         row = np.array([a + (b - a) * steps for a, b in self._ends])
         self._row = row.tolist()
@@ -202,10 +219,9 @@ class ContactFit:
         """
         grams: list[Gram] = gram.tolist()
         links = [self._link(i, one) for i, one in enumerate(grams)]
-        pieces, left = self._along(len(grams) - 1, grams[-1])
+        pieces, left = self._along(grams[-1])
         for i, (link, values) in enumerate(zip(links, self._log_density(links), strict=True)):
             pieces += self._grid(i, link, values)
-            pieces += self._at_ends(i, link)
         pieces.sort(reverse=True)
         floor = pieces[0][0] - CONTACT.search_depth
         pieces = [piece for piece in pieces if piece[0] > floor]
@@ -220,25 +236,18 @@ class ContactFit:
         Twist: the line of the force has a moment arm about the axis.  Axial: a friction force along the surface, one
         radius off the axis.
         """
-        given, radius, (start, end) = self._given, self._radius[i], self._ends[i]
-        precision = given.force_scale**-2
-        link = _Link.of(gram, precision, 0.0)
-        found = [link.force(start + (end - start) * part) for part in (1 / 6, 1 / 2, 5 / 6)]
+        link, (arm, turn) = _Link.of(gram, self._precision, 0.0), self._arms[i]
+        found = [link.force(place) for place in self._tried[i]]
         largest = math.hypot(*max(found)[1])
         _, (f1, f2) = max([(each + math.log(s[0] * s[2] - s[1] * s[1]), force) for each, force, s in found])
-        size, turn = math.hypot(f1, f2) + CONTACT.smallest_force, given.friction * radius
-        twist, axial, turn1, turn2 = (
-            given.moment_arm_offset * radius * size,
-            given.friction * size,
-            turn * f1,
-            turn * f2,
-        )
+        size = math.hypot(f1, f2) + CONTACT.smallest_force
+        twist, axial, turn1, turn2 = arm * size, self._given.friction * size, turn * f1, turn * f2
         u = [twist * g for g in gram[TWIST]]
         v = [axial * g + turn1 * a + turn2 * b for g, a, b in zip(gram[AXIAL], gram[3], gram[4])]  # noqa: B905
         w12 = axial * u[AXIAL] + turn1 * u[3] + turn2 * u[4]
         w22 = 1.0 + (axial * v[AXIAL] + turn1 * v[3] + turn2 * v[4])
         wide, volume = widened(gram, u[:5], v[:5], 1.0 + twist * u[TWIST], w12, w22)
-        precision = min(precision, 1.0 / (largest * largest + CONTACT.smallest_force))
+        precision = min(self._precision, 1.0 / (largest * largest + CONTACT.smallest_force))
         return _Link.of(wide, precision, volume + 2.0 * self._log_rarity(largest))
 
     def _log_rarity(self, size: float) -> float:
@@ -255,7 +264,10 @@ class ContactFit:
         return found
 
     def _grid(self, i: int, link: _Link, values: list[float]) -> list[Piece]:
-        """Pieces with a contact from the side; a peak that is narrower than some is divided into pieces of its own."""
+        """Pieces with a contact from the side; a peak that is narrower than some is divided into pieces of its own.
+
+        Where two links meet, a contact is more frequent than elsewhere along them.
+        """
         x, (start, end) = self._row[i], self._ends[i]
         width = (end - start) / len(x)
         for refined in range(CONTACT.refinements + 1):
@@ -268,42 +280,31 @@ class ContactFit:
             x = [low + (k + 0.5) * width for k in range(CONTACT.peak_positions)]
             values = [link.log_density(place) for place in x]
         constant = link.constant + self._frequency[i]
-        return [(value + constant, place, width, i, False) for value, place in likely]
+        pieces = [(value + constant, place, width, i, False) for value, place in likely]
+        constant, width = link.constant + self._end_frequency, CONTACT.end_length
+        return pieces + [(link.log_density(x) + constant, x, width, i, False) for x in self._meeting[i]]
 
-    def _at_ends(self, i: int, link: _Link) -> list[Piece]:
-        """A contact where two links meet, which is more frequent there than elsewhere along them."""
-        (start, end), width, weight = self._ends[i], CONTACT.end_length, self._given.end_weight
-        if not weight:
-            return []
-        constant = link.constant + math.log(weight / width)
-        places = [start + 0.5 * width] * (i > 0) + [end - 0.5 * width] * (i + 1 < len(self._ends))
-        return [(link.log_density(x) + constant, x, width, i, False) for x in places]
-
-    def _along(self, i: int, gram: Gram) -> tuple[list[Piece], float]:
+    def _along(self, gram: Gram) -> tuple[list[Piece], float]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
         A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns what the
         best of them does not explain, chi^2, too.
         """
-        scale, weight, (start, end) = self._given.force_scale, self._given.along_weight, self._ends[i]
-        if not weight:
-            return [], math.inf
-        size = abs(gram[0][AXIAL]) / (gram[AXIAL][AXIAL] + scale**-2) + CONTACT.smallest_force
-        arm, length, rarity = math.sqrt(0.5) * self._radius[i] * size, end - start, self._log_rarity(size)
+        scale, precision, (_, end) = self._given.force_scale, self._precision, self._ends[-1]
         r, a1, a2, b1, b2, _, axial = gram
-        inner = [[r[0], r[AXIAL]], [r[AXIAL], axial[AXIAL]]]
-        found, left, slopes = list[Piece](), math.inf, CONTACT.end_slopes
-        # a force across: at the start, times the moment arm about it; position, width and share of the weight
-        pieces = [(0.0, arm, start + 0.5 * length, length, 1)]
-        pieces += [(slope * size, slope * size * end, end, CONTACT.end_length, len(slopes)) for slope in slopes]
-        for lean, far, x, width, count in pieces:
+        size = abs(r[AXIAL]) / (axial[AXIAL] + precision) + CONTACT.smallest_force
+        rarity, inner = self._log_rarity(size), [[r[0], r[AXIAL]], [r[AXIAL], axial[AXIAL]]]
+        found, left = list[Piece](), math.inf
+        for slope, arm, x, width, frequency in self._along_pieces:
+            lean = slope * size
+            far = lean * end + arm * size
             u = [lean * a + far * b for a, b in zip(a1, b1)]  # noqa: B905
             v = [lean * a + far * b for a, b in zip(a2, b2)]  # noqa: B905
             w11, w12, w22 = 1.0 + (lean * u[1] + far * u[3]), lean * u[2] + far * u[4], 1.0 + (lean * v[2] + far * v[4])
             ((rr, ra), (_, aa)), volume = widened(inner, [u[0], u[AXIAL]], [v[0], v[AXIAL]], w11, w12, w22)
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
-            found.append((value + math.log(weight / (count * width)), x, width, i, True))
-            left = min(left, rr - ra * ra / (aa + scale**-2))
+            found.append((value + frequency, x, width, len(self._ends) - 1, True))
+            left = min(left, rr - ra * ra / (aa + precision))
         return found, left
 
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
@@ -360,3 +361,8 @@ class ContactFit:
             force_at_end=link.force(end)[1],
             residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
+
+
+def _log(value: float) -> float:
+    """Natural logarithm, of 0, too."""
+    return math.log(value) if value else -math.inf
