@@ -82,7 +82,7 @@ class ModelErrors:
     ----------
     size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
         at least 1.
-    beyond : names of the errors that are certainly larger than tolerable, the largest first.
+    beyond : name of the error that is certainly larger than tolerable, the most; '' for none.
     """
 
     def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array, least_noise: float) -> None:
@@ -209,8 +209,8 @@ class ModelErrors:
         rest = covariance - seen.effects.dot(self.covariance.dot(seen.effects.T))
         self._take(innovation, covariance + (CONTACT.correlated - 1.0) * rest, seen)
 
-    def _beyond(self) -> list[str]:
+    def _beyond(self) -> str:
         excess = np.abs(self.errors) - CONTACT.sure * np.sqrt(self.covariance.diagonal())
         ratio = excess / self._prior.tolerable
-        found = np.flatnonzero(ratio > 1.0)
-        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []
+        worst = int(ratio.argmax())
+        return self._prior.names[worst] if ratio[worst] > 1.0 else ""

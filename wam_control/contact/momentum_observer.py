@@ -242,7 +242,7 @@ class MomentumObserver:
     def warning(self) -> Event | None:
         """`Code.MODEL_OFF` with the part of the model that is off the most; None for none."""
         beyond = self._errors.beyond
-        return warning(Code.MODEL_OFF, "model_off", part=beyond[0]) if beyond else None
+        return warning(Code.MODEL_OFF, "model_off", part=beyond) if beyond else None
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
