@@ -156,7 +156,7 @@ class ForceLoop:
     @property
     def event(self) -> Event:
         """The most serious one; OBEYED where the loop obeys."""
-        return next(iter(self.events), OBEYED)
+        return self.events[0] if self.events else OBEYED
 
     @property
     def is_advised(self) -> bool:

@@ -183,7 +183,7 @@ class ForceLoopParameters:
         live=True,
     )
 
-    @property
+    @cached_property
     def is_estimated(self) -> bool:
         """Whether the estimated torques are fed back, in place of those of sensors."""
         return self.feedback == "contact_estimate"
