@@ -14,7 +14,6 @@ from wam_control.force.force_axis import Angles, ForceAxes, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement, LowPass
 from wam_control.force.force_watch import ForceWatch, MotionWatch
-from wam_control.force.limits import latency
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Covers, Servo, Timing
@@ -68,9 +67,9 @@ class AxisRun:
         if not (own.limits.impact and self.watch.touch.is_there):
             self.rising = self._shown = self.known.force if own.limits.impact else desired
             return desired
-        most = max(desired, self.rising) * dt / max(FORCE.ramp * latency(own), dt)
+        most = max(desired, self.rising) * dt / max(FORCE.ramp * own.latency, dt)
         self.rising += min(max(desired - self.rising, -most), most)
-        self._shown += (self.rising - self._shown) * dt / (FORCE.shown * latency(own) + dt)
+        self._shown += (self.rising - self._shown) * dt / (FORCE.shown * own.latency + dt)
         return self._shown
 
     def goal(self, axis: CommandedAxis, dt: float, lasting: float) -> float:

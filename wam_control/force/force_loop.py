@@ -358,8 +358,8 @@ class ForceLoop:
         factor = (
             supervision.factor(lambda: guarded(self._q, axes, contact, sensing, own, supervision), dt) if axes else 1.0
         )
-        is_watched = bool(axes) and own.is_estimated and not run.is_touching
-        is_watching = is_watched and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
+        may_watch = axes and own.is_estimated and not run.is_touching
+        is_watching = bool(may_watch) and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
         torque_sd = self._measurement.torques.sd
         if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
             run.still_sd = torque_sd

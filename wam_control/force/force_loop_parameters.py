@@ -9,6 +9,7 @@ from wam_control.force.force_law import ForceLaw
 from wam_control.force.sampled_loop import Feedback
 from wam_control.force.stability_guard import GuardedTask, GuardParameters
 from wam_control.force.task import TaskParameters
+from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, parameter, require
 
@@ -192,6 +193,16 @@ class ForceLoopParameters:
     def sensing_fed_back(self) -> SensingParameters:
         """How the force is sensed with this feedback."""
         return self.sensing.of_estimate if self.is_estimated else self.sensing
+
+    @cached_property
+    def latency(self) -> float:
+        """By how much the measured force is late, s."""
+        return self.force_filter + self.guard.feedback_lag * self.is_estimated
+
+    @cached_property
+    def rise_time(self) -> float:
+        """Time in which the force on the stiffest surface may rise, s: some latencies of the measured force."""
+        return FORCE.rise * self.latency
 
     def impact_energy(self, force: float) -> float:
         """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite if it is 0."""

@@ -17,7 +17,6 @@ from typing import NamedTuple
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import rise_time
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.event import Code, Event, Value, holding, warning
@@ -115,7 +114,7 @@ class Oscillation:
         least, window = max(own.limits.cycle_force * abs(desired), 2.0 * FORCE.certain * sd), own.limits.settling_time
         count = self._turns.step(force, least, window, dt)
         # a cycle that grows is seen late, and with a wrong size; one that is slower than the loop is not its own
-        faint = self._faint.step(force, FORCE.faint_swing * least, FORCE.turns * rise_time(own), dt)
+        faint = self._faint.step(force, FORCE.faint_swing * least, FORCE.turns * own.rise_time, dt)
         is_swinging = count > FORCE.turns
         if is_swinging:
             swing, period = self._turns.swing

@@ -43,16 +43,6 @@ def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
     return 1.0 / own.guard.contact_stiffness + sensed.compliance
 
 
-def latency(own: ForceLoopParameters) -> float:
-    """By how much the measured force is late, s."""
-    return own.force_filter + own.guard.feedback_lag * own.is_estimated
-
-
-def rise_time(own: ForceLoopParameters) -> float:
-    """Time in which the force on the stiffest surface may rise, s: some latencies of the measured force."""
-    return FORCE.rise * latency(own)
-
-
 def approach_speed(
     axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters, servo_yielding: float = 0.0
 ) -> float:
@@ -75,12 +65,12 @@ def approach_speed(
         return math.inf
     slowest = FORCE.creep / limits.settling_time
     whole = axis.desired * yielding(sensed, own)
-    rise = rise_time(own) if place.is_known else max(FORCE.identified_rise, rise_time(own))
+    rise = own.rise_time if place.is_known else max(FORCE.identified_rise, own.rise_time)
     if is_touching:
         return max((whole + axis.desired * servo_yielding) / sensed.speed_fraction / rise, slowest)
     fastest = limits.impact * axis.desired / math.sqrt(sensed.impact_mass * own.guard.contact_stiffness)
     if not place.is_known:
-        detected = rise_time(own) if own.is_estimated else FORCE.detected * own.force_filter
+        detected = own.rise_time if own.is_estimated else FORCE.detected * own.force_filter
         fastest = min(fastest, max(whole / detected, slowest))
     return fastest / sensed.speed_fraction
 
@@ -156,6 +146,6 @@ def followed(posture: Array, axis: CommandedAxis, body: RigidBody, q: Angles, ow
     assert axis.sensed is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
     slide = FORCE.slide_slope * length(body.point_jacobian(q, axis.place.cover, point).dot(posture))
-    pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(latency(own), FORCE.negligible))
+    pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(own.latency, FORCE.negligible))
     most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)
     return posture * (most / slide) if slide > most else posture
