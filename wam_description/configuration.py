@@ -2,6 +2,7 @@
 
 import difflib
 import os
+import re
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,6 +17,7 @@ from wam_description.arm import Shared
 from wam_description.parameters import ParameterError, build, fields, given_once, listed, nested
 from wam_description.thresholds import FILES
 
+GIVEN = "a value that you set"  # what is at fault where the file is right
 T = TypeVar("T")
 SHARED = "/**"
 BASE = "base"  # key of an overlay that names the configuration it changes
@@ -106,13 +108,13 @@ class Configuration(NamedTuple):
             flat = sections[self._section(node) if colon else SHARED]
             if parameter not in flat and (colon or parameter not in _NOT_REQUIRED):
                 where = f"node '{node}'" if colon else "section '/**'"
-                meant = self._meant(key)
+                meant, groups = self._meant(key), sorted({re.sub(r"\..*", ".*", name) for name in flat})
                 raise ParameterError(
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
                     + (
                         f"did you mean {meant}?"
                         if meant
-                        else f"it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
+                        else f"it has: {', '.join(groups) or 'none'} (write node:parameter for one of a node)"
                     )
                 )
             flat[parameter] = shaped_like(flat.get(parameter), value)
@@ -184,7 +186,7 @@ class Configuration(NamedTuple):
             return build(cls, self.sections[section])
         except ParameterError as error:
             where = f"section '{SHARED if section == SHARED else f'/**/{section}'}'"
-            given = "a value that you set" if self._file_is_right(section, cls) else self.path
+            given = GIVEN if self._file_is_right(section, cls) else self.path
             raise ParameterError(f"{given}, {where}: {error}") from error
 
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:

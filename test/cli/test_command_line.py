@@ -72,7 +72,7 @@ def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -
     [
         ("arm.links.mas=[2.5]", "to set to [2.5]; did you mean 'arm.links.mass'?"),
         ("force_gain=[0.01]", "did you mean 'force_loop:force_gain'?"),
-        ("foo=1", "it has: ages.command, "),
+        ("foo=1", "it has: ages.*, arm.*, "),
         ("nothing", "write [node:]parameter=value"),
         ("drivr:seed=1", "no section '/**/drivr'"),
         ("force_loop:timing.period=0.01", "did you mean 'timing.period' of section '/**'?"),

@@ -131,7 +131,7 @@ steps:
     assert row["failure"] == ""
     assert row["reported"] == "press: refused"
     assert float(row["force_worst"]) > 1.0
-    assert "1 sets, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
+    assert "1 set, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from wam_analysis.identification.unknowns import AXES, DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY, LAYOUT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Shared
-from wam_description.configuration import PARAMETERS, SHARED, Configuration
+from wam_description.configuration import GIVEN, PARAMETERS, SHARED, Configuration
 from wam_description.parameters import ParameterError
 
 HEADING = "# The controllers' model as identified"  # of the file
@@ -92,7 +92,8 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     try:
         _ = configuration.with_values(values).shared.model_arm
     except ParameterError as error:
-        reason = str(error).removeprefix(f"{configuration.path}, section '{SHARED}': ")
+        where = f", section '{SHARED}': "
+        reason = str(error).removeprefix(GIVEN + where).removeprefix(f"{configuration.path}{where}")
         return (
             f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "
             "touched the arm, or it moved too little: identify from a recording without contact, such as "

@@ -98,7 +98,8 @@ def run(given: argparse.Namespace) -> int:
     failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
     failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
     doubts = f", {doubted} with a force that may be wrong (column reported)" if doubted else ""
-    print(f"{len(sets)} sets, {failed} failed{' (column failure)' * bool(failed)}{doubts}, in {given.file}")
+    count, why = f"{len(sets)} set{'s' * (len(sets) != 1)}", " (column failure)" * bool(failed)
+    print(f"{count}, {failed} failed{why}{doubts}, in {given.file}")
     if failed == len(sets):
         print(f"every set failed; the first: {failures[0]}", file=sys.stderr)
     return int(failed == len(sets))
