@@ -294,7 +294,8 @@ class ContactFit:
         r, a1, a2, b1, b2, _, axial = gram
         size = abs(r[AXIAL]) / (axial[AXIAL] + precision) + CONTACT.smallest_force
         rarity, inner = self._log_rarity(size), [[r[0], r[AXIAL]], [r[AXIAL], axial[AXIAL]]]
-        found, left = list[Piece](), math.inf
+        found: list[Piece] = []
+        left = math.inf
         for slope, arm, x, width, frequency in self._along_pieces:
             lean = slope * size
             far = lean * end + arm * size
@@ -329,7 +330,10 @@ class ContactFit:
                     unused = width * (passed - enough) / weight
                     below = 0.5 if math.isnan(part.low) else float(x > part.low)
                     low, high = low + (1.0 - below) * unused, high - below * unused
-                part.low, part.high = min(low, part.low), max(high, part.high)  # of a NaN the first one is taken
+                if not part.low <= low:  # of a NaN, too
+                    part.low = low
+                if not part.high >= high:
+                    part.high = high
         return parts, total
 
     def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, left: float) -> Fit:

@@ -75,7 +75,7 @@ class GaugeEffects:
         """See `ErrorEffects.observation`."""
         n = len(motion.model)
         effects = np.zeros((n, 4 * n + 1))
-        effects.ravel()[: n * len(effects[0]) : len(effects[0]) + 1] = motion.model  # the diagonal
+        effects.ravel()[:: 4 * n + 2] = motion.model  # the diagonal
         effects[:, n:] = self._links.of(motion.pose, self._still, self._still)
         residual = motion.residual - self._payload * effects[:, -1]
         return Observation(residual, effects, self._rest, self._still, motion.pose, self._lasting)
@@ -150,7 +150,7 @@ class ErrorEffects:
         own = modelled[:, None] * self._differs
         own.ravel()[:: n + 1] -= self._from_motors.T.dot(residual)  # the diagonal
         effects[:, 8 * n : 9 * n] = self._to_joints.dot(own)
-        effects[:, 9 * n : 11 * n] = -self._through * (self._dynamic * slope)
+        effects[:, 9 * n : 11 * n] = self._through * (-self._dynamic * slope)
         effects[:, 11 * n] = self._to_joints.dot(signals[-n:])
         effects[:, 11 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
         residual = residual - given.payload[0] * effects[:, -1]
