@@ -61,7 +61,7 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
 }
 INSTEAD: Final = {  # of a part and where it comes from, what makes it smaller instead
     ("torques", "dithered motors"): "use joint sensors",
-    ("torques", "sensors"): "raise limits.tolerance, or command fewer forces at once",
+    ("torques", "sensors"): "raise limits.tolerance, or command another direction; of several forces, command fewer",
     ("place", "pinned"): "bend the arm, or lower contact_position_sd if the position is known better",
 }
 UNKNOWN: Final = "{desired:.3g} {unit} at {where} cannot be controlled because of {part_text}"
@@ -117,11 +117,11 @@ SENTENCES: Final = {  # by cause
     "(limits.free_travel); the arm holds its position; end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
-    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:.3g} {unit} have been measured for "
+    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:z.3g} {unit} have been measured for "
     "{time:b} s; {reach}",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
-    "{measured:.3g} {unit} are measured, {desired:.3g} {unit} are commanded; perhaps the surface moves, something else "
-    "pushes, or the friction of the surface has changed its direction",
+    "{measured:z.3g} {unit} are measured, {desired:.3g} {unit} are commanded; perhaps the surface moves, something "
+    "else pushes, or the friction of the surface has changed its direction",
     "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but it has been at {measured:.4g} {unit} for {time:b} s; "
     "allowed error: {allowed:.2g} {unit}; perhaps something is in the way, a joint is at its end, or the arm cannot "
     "move in this direction here",
@@ -167,8 +167,8 @@ HIDDEN: Final = {  # by what measures the force: what else may explain the torqu
 }
 SINCE: Final = ("without a contact", "since the force was last within its tolerance")
 REACH: Final = (
-    "nothing is touched; bring the arm to the surface first, command more force, or bend the arm",
-    "command a force that the arm can reach, or bend the arm",
+    "nothing is touched; bring the arm to the surface first, or command more force",
+    "command a force that the arm can reach",
     f"the arm is pulled, or carries a load that is not in its model; {PARTS['resting'][1]}",
 )
 CALM: Final = ("lower force_gain", "lower force_gain, or use joint sensors")
@@ -256,5 +256,6 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
     if "pin" in values and helps is not PINNED:
         found.append(PINNED)
     if "searched" in values and not found:
+        helps = "command another direction" if helps is PINNED else helps  # a pinned position would not help either
         return f"neither a force up to 5 times as large nor the turn of a single joint helps; {helps}"
     return ", or ".join([*found, helps])

@@ -281,7 +281,8 @@ def brief_rests() -> list[Case]:
         way = np.where(np.arange(len(phase)) * faster / rate % 2.8 < 1.4, 1.0, -1.0)
         position = 0.3 * way * np.cos(math.pi * np.minimum(phase, 1.0))
         sent = joints("/joint_states", np.arange(len(phase)) / rate, ["a"], position=position[:, None])
-        said = f"a: always in motion (shorter rests than {told} s do not count, half the time between two turns)."
+        why = "half the time from one reversal to the next"
+        said = f"a: always in motion (rests shorter than {told} s, {why}, do not count)."
         return Case(f"{faster:g}", write, sent, {}, "", NOTHING, (said,))
 
     return [resting(by_rosbags, 100.0, 1.0, "0.505"), resting(sqlite, 1000.0, 10.0, "0.0505"),
@@ -403,7 +404,7 @@ def wrong_efforts() -> list[Case]:
             sine(0.7, 0.5),
             "",
             NOTHING,
-            ("a: no friction is determined: dry friction ", "; the motion has too little that is slow and fast"),
+            ("a: friction is not identified: the errors are too large (dry friction ", "; the model leaves "),
         ),
         Case("limited", by_rosbags, changed(lambda e: np.clip(e, -1.6, 1.6)), sine(0.7, 0.5), "as if it was limited"),
     ]

@@ -447,7 +447,7 @@ def test_a_joint_torque_that_nothing_takes_is_reported_in_time() -> None:
     assert world.loop.event.code is Code.NONE
     world.step(base(*joint_axes(AxisKind.FORCE, wanted)), 10)
     assert world.loop.event.code is Code.NOT_REACHED
-    assert world.loop.event.values["axis"] == "force of joint 2"
+    assert world.loop.event.values["axis"] == "torque of joint 2"
     spring = world.q.copy()
     for _ in range(300):
         world.hand = -200.0 * (world.q - spring)

@@ -37,7 +37,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if not _is_known(found):
             if not unlike and np.any(one.values.get("effort", 0.0)) and len(one.values) > 1 and not rests(one):
                 which = wrong if found.dynamic.is_negative else doubts
-                which.append(f"{one.label}: no friction is determined: {_lacking(every)}.")
+                which.append(f"{one.label}: friction is not identified: {_lacking(every, found.unexplained)}.")
             continue
         numbers = [number for number in every if number[2].is_sure]
         findings += [
@@ -74,7 +74,7 @@ def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:
     return ", ".join(f"{what} {shown(known.value)} +- {shown(known.error, unit)}" for what, unit, known in numbers)
 
 
-def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]]) -> str:
+def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]], unexplained: float) -> str:
     """Which condition of an identified friction is not met."""
     if below := [number for number in numbers if number[2].is_negative]:
         return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
@@ -82,7 +82,8 @@ def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]]) -> str:
         part = f"less than {100.0 * SHAFT.both_ways:g} % of the way is to one side"
         return f"fewer than {SHAFT.fewest_samples} samples are apart from turns, or {part}"
     finite = _stated([number for number in numbers[:2] if math.isfinite(number[2].error)])
-    return f"{finite}{'; ' * bool(finite)}the motion has too little that is slow and fast for smaller errors"
+    large = f"the errors are too large{f' ({finite})' * bool(finite)}"
+    return f"{large}; the model leaves {100.0 * unexplained:.2g} % of the effort unexplained"
 
 
 def _limited(source: Source) -> str:

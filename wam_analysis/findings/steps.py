@@ -155,7 +155,7 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [one for one in held if not one.hold.is_refused]
     if len(done) < len(held):
-        return VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} refused")
+        return VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} not applied")
     errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
     answer = _answer(question, errors, HOLD.force_tolerance, "{:.1f} %")
     short = brief + sum(one.hold.is_short for one in done)
@@ -175,9 +175,11 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Of each true contact; one that is estimated where none is has its own answer."""
     if any(one.lasts for one in recording.missed):
         return VerdictAnswer("correct link", VerdictResult.NO, "missed")
-    right = [one.right for one in recording.touched if one.lasts]
-    answer = _answer("correct link", [1.0 - part for part in right], 1.0 - TOUCH.lasting, "another link")
-    least = f"{100.0 * min(right, default=0.0):.3g} %"
+    lasting = [one for one in recording.touched if one.lasts]
+    wrong = dict.fromkeys(one.link for one in lasting if one.right < TOUCH.lasting)
+    shown = f"another link than {', '.join(wrong)}"
+    answer = _answer("correct link", [1.0 - one.right for one in lasting], 1.0 - TOUCH.lasting, shown)
+    least = f"{100.0 * min((one.right for one in lasting), default=0.0):.3g} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 
@@ -195,11 +197,11 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
 def _false_verdict(traces: Traces) -> VerdictAnswer:
     """Whether a contact was estimated where none is."""
     part, seconds = traces.false_percent, traces.false_seconds
-    question = f"false contact for at most {TOUCH.false_tolerance:g} % of the time without a contact"
+    question = f"at most {TOUCH.false_tolerance:g} % false contact"
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
-        brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
+        brief = f"false for {1e3 * seconds:.0f} ms, as the end of a contact may be"
         return VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)
-    return VerdictAnswer(question, _yes(part <= TOUCH.false_tolerance), f"{part:.1f} %")
+    return VerdictAnswer(question, _yes(part <= TOUCH.false_tolerance), f"{part:.1f} % of the time without one")
 
 
 def _answer(question: str, values: Sequence[float], allowed: float, shown: str) -> VerdictAnswer:

@@ -74,8 +74,8 @@ class Sticking(NamedTuple):
         """How much of the time it was at rest, and how often it moved."""
         if not self.slips:
             return "never moved"
-        turns = ", half the time between two turns" * self.is_turning
-        counted = f"shorter rests than {shown(self.shortest, 's')} do not count{turns}"
+        turns = ", half the time from one reversal to the next," * self.is_turning
+        counted = f"rests shorter than {shown(self.shortest, 's')}{turns} do not count"
         if not self.stuck and self.slips == 1:
             return f"always in motion ({counted})"
         return f"at rest for {100.0 * self.stuck:.0f} % of the time ({counted}), moved {times(self.slips)}"

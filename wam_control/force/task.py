@@ -66,7 +66,7 @@ class TaskAxis(NamedTuple):
         """The axis in words."""
         kind = self.kind.name.lower()
         if self.joint >= 0:
-            return f"{kind} of joint {self.joint + 1}"
+            return f"{'torque' if self.kind is AxisKind.FORCE else kind} of joint {self.joint + 1}"
         x, y, z = self.direction
         place = "the estimated position" if self.position is None else f"{self.position:.3g} m"
         return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place}{f' along {self.cover}' if self.cover else ''}"
