@@ -24,7 +24,7 @@ def force_torque(run: CommandRun, holds: bool, own: ForceLoopParameters) -> Arra
     holds : whether the arm holds instead.
     own : parameters of the force loop.
     """
-    fed = np.zeros_like(run.approached)
+    fed = np.zeros(len(run.approached))
     for one in run.axes:
         axis = one.now
         if axis.is_force and not holds:
