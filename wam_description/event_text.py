@@ -10,7 +10,6 @@ from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
 from wam_description.signals import NodeStatus
 
-ALSO: Final = "; also: "  # between two events
 REASONS: Final = {
     Reason.MOMENT_ONLY: "on this link only the moment is measured: the contact position is unknown, and the estimated "
     "force is a lower bound",
@@ -208,16 +207,15 @@ def _digits(values: Mapping[str, Any]) -> int:
     return 2 if value is None or allowed in (None, value) else digits_apart(value, allowed)
 
 
-def sentences(events: Iterable[Event]) -> str:
+def sentences(events: Iterable[Event], between: str = "; also: ") -> str:
     """Several events in words, each once."""
-    return ALSO.join(filter(None, dict.fromkeys(map(sentence, events))))
+    return between.join(filter(None, dict.fromkeys(map(sentence, events))))
 
 
 def news(status: NodeStatus, known: Collection[object]) -> str:
     """What a status states of other subjects than those that are known, for a terminal: a line for each event."""
     new = [one for one in status.events if one.subject not in known]
-    text = status.message if len(new) == len(status.events) else sentences(new)
-    return text.replace(ALSO, f"\n    {ALSO.removeprefix('; ')}")
+    return sentences(new, "\n    also: ") or status.message
 
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:

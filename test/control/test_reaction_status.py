@@ -64,7 +64,7 @@ def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: 
 def test_each_of_several_events_is_a_line_at_a_terminal_once() -> None:
     late, end = refused("a", "no effect"), Event(Code.DONE)
     status = NodeStatus(Level.WARN, sentences([late, end]) + "; commanded: 1", events=(late, end))
-    assert news(status, ()).splitlines() == ["no effect", "    also: done; commanded: 1"]
+    assert news(status, ()).splitlines() == ["no effect", "    also: done"]
     assert news(status, {late.subject}) == "done"
 
 
