@@ -35,7 +35,7 @@ class DriverNode(ArmDriver):
         self.inlets.feed("sim/disturbance", self._take_push)
         self.serve("pause", SetBool, self._pause)
         self.serve("reset", Trigger, lambda _: self.driver.reset())
-        self.serve("step", Trigger, lambda _: self.time.step())
+        self.serve("step", Trigger, lambda _: self._step())
         self._try_post_mortem()
         self.time: Lockstep | Realtime
         if timing.mode == "lockstep":
@@ -155,6 +155,11 @@ class DriverNode(ArmDriver):
     def _pause(self, request: SetBool.Request) -> Answer:
         self.time.pause(bool(request.data))
         return Answer(True, "paused" if request.data else "running")
+
+    def _step(self) -> Answer:
+        refusal = self.time.step() if self.is_paused else "the driver is running; call pause first"
+        text = f"refused: {refusal}" if refusal else f"stepped; the time of the arm is {self.stamp} ns"
+        return Answer(not refusal, text)
 
     def _publish(self) -> None:
         driver, publish = self.driver, self.outlets.publish

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from wam_description.arm import Timing
 from wam_description.event import Event, fault
 from wam_description.interface import Interface
-from wam_description.signals import Answer
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 from wam_driver.driver import Driver
 from wam_driver.pacer import Pacer
@@ -170,14 +169,12 @@ class Lockstep:
         self.pacer.restart()
         self.go_on()
 
-    def step(self) -> Answer:
-        """Advance a paused arm by one period."""
-        if not self.is_paused:
-            return Answer(False, "refused: the driver is running; call pause first")
+    def step(self) -> str:
+        """Advance a paused arm by one period; why that is refused, '' where it is not."""
         if missing := self.missing:
-            return Answer(False, f"refused: still waiting for {' and '.join(missing)}")
+            return f"still waiting for {' and '.join(missing)}"
         self._one_period()
-        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp / 1e9:.3f} s")
+        return ""
 
     def facts(self) -> dict[str, str]:
         """For the diagnostics: the pace, where it is one; without a pace nothing depends on the wall clock."""

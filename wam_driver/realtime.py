@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from wam_description.arm import Timing
 from wam_description.event import fault
-from wam_description.signals import Answer
 from wam_driver.driver import Driver
 from wam_driver.safety import Mode
 from wam_driver.thresholds import DRIVER
@@ -149,13 +148,11 @@ class Realtime:
         self.is_paused = on
         self._progress = self._now()
 
-    def step(self) -> Answer:
-        """Advance a paused arm by one period."""
-        if not self.is_paused:
-            return Answer(False, "refused: the driver is running; call pause first")
+    def step(self) -> str:
+        """Advance a paused arm by one period, which is never refused."""
         self._driver.advance(0.0)
         self._send()
-        return Answer(True, f"stepped; the time of the arm is {self._driver.stamp / 1e9:.3f} s")
+        return ""
 
     def facts(self) -> dict[str, str]:
         """For the diagnostics: latencies since the last report, late periods and rate since the start."""
