@@ -15,6 +15,7 @@ from wam_description.urdf import urdf
 from wam_description.wiring import Declaration
 from wam_driver.safety import Mode, Safety
 from wam_driver.session import Session
+from wam_driver.thresholds import DRIVER
 from wam_ros.connections import StackNode
 from wam_ros.health import problem_of
 from wam_ros.limits import NODE_LIMITS
@@ -58,6 +59,8 @@ class ArmDriver(StackNode):
         self.serve("reset_fault", Trigger, lambda _: self.reset_fault())
         self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
         self.create_timer(NODE_LIMITS.claim_period, self._look_at_nodes)
+        if not is_lockstep:
+            self.create_timer(DRIVER.status_period, self.health.repeat_taken)
 
     # what a driver adds
 

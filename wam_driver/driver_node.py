@@ -68,7 +68,6 @@ class DriverNode(ArmDriver):
         )
         self.announce()
         self.create_timer(timing.period, self.time.tick)
-        self.create_timer(DRIVER.status_period, self.health.repeat_taken)
         self.time.start()
 
     def destroy_node(self) -> None:

@@ -16,7 +16,6 @@ from wam_driver.bus.bus_parameters import SIMULATED
 from wam_driver.bus.line import line_of
 from wam_driver.limit_watch import LimitWatch, excess
 from wam_driver.safety import Mode, Safety
-from wam_driver.thresholds import DRIVER
 
 
 class BusDriver(ArmDriver):
@@ -41,7 +40,6 @@ class BusDriver(ArmDriver):
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
         self.serve("confirm_home", Trigger, self._confirm_home)
         self.create_timer(self.shared.timing.period, self._run)
-        self.create_timer(DRIVER.status_period, self.health.repeat_taken)
 
     def make_hardware(self, shared: Shared, own: Any) -> Any:
         """The motors: those of the production WAM on its bus."""
