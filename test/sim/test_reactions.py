@@ -130,8 +130,8 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(
 @pytest.mark.slow
 def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[AnalysedRecording, Analysis]) -> None:
     told = " ".join(text(found[1]).split())
-    assert "force within 10 %: NO (4 of 6 refused)" in told
-    assert "Problems: Failed: force within 10 % (4 of 6 refused)" in told
+    assert "force within 10 %: NO (4 of 6 not applied)" in told
+    assert "Problems: Failed: force within 10 % (4 of 6 not applied)" in told
     for name, (kind, _) in REFUSED.items():
         assert re.search(rf" {name}(, axis \d)?: {kind} from", told)
 

@@ -73,7 +73,7 @@ def test_a_force_that_is_refused_ends_the_demonstration_with_an_exit_code_and_th
     done = without_ros(tmp_path, "demo", "--scenario", "press.yaml", "--name", "press")
     assert done.returncode == 1
     last = done.stdout.rstrip().splitlines()[-1]
-    assert last == "checks failed: force within 10 %: NO (1 of 1 refused)"
+    assert last == "checks failed: force within 10 %: NO (1 of 1 not applied)"
     assert "press: refused from" in done.stdout
     assert "largest error" not in done.stdout
 
