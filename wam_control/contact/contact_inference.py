@@ -98,7 +98,7 @@ class ContactInference:
 
     Attributes
     ----------
-    jacobians : (covers, 6, n), of the covers in the last pose.
+    jacobians : (covers, 6, n), of the covers in the last pose, once there is one.
     fusion : earlier moments of the present contact.
     """
 
@@ -118,7 +118,6 @@ class ContactInference:
             None,
         )
         self._wrenches = np.array([cover.wrenches for cover in covers])
-        self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
         self.fusion = ContactFusion(parameters.fusion_time)
 
     def infer(

@@ -47,7 +47,7 @@ class LinkEffects:
 
     def __init__(self, arm: Arm, body: RigidBody, masses: Array) -> None:
         n = len(masses)
-        self._body, tool = body, np.array(arm.tool)
+        self.body, tool = body, np.array(arm.tool)
         inertia = tool @ tool * np.eye(3) - np.outer(tool, tool)
         self._per_error = np.zeros((10 * n, 3 * n + 1))
         for i, mass in enumerate(masses):
@@ -56,11 +56,7 @@ class LinkEffects:
 
     def of(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
         """Torques, (n, 3 n + 1), per m of the centres' coordinates in the frames of their links, and per kg."""
-        return self._body.inverse_dynamics_regressor(pose, velocity, acceleration).dot(self._per_error)
-
-    def weights(self, pose: Array) -> Array:
-        """Torques that carry the links, (n,), N m."""
-        return self._body.gravity_torque(pose)
+        return self.body.inverse_dynamics_regressor(pose, velocity, acceleration).dot(self._per_error)
 
 
 class GaugeEffects:
@@ -143,7 +139,7 @@ class ErrorEffects:
             0.0, np.square(by_distance).dot(EQUAL) - sliding * sliding - slope * slope * DISTANCE_VARIANCE
         )
         modelled = self._from_motors.T.dot(model)
-        weights = self._links.weights(motion.pose)
+        weights = self._links.body.gravity_torque(motion.pose)
         effects = np.zeros((n, 14 * n + 2))
         sizes = np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded))
         np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
