@@ -31,7 +31,7 @@ class DryFriction:
     elastic : torque of friction on each shaft with elastic displacement, N m; empty if no shaft has any.
     bounds : velocities of each shaft, rad/s, above and below which `follow` has anything to do; they and `direction`
         remain the same lists, which the steps in C read.
-    is_steady : True if `follow` needs neither loads nor held torques.
+    is_steady : True if `follow` looks neither at loads nor at held torques.
 
     Raises
     ------
@@ -113,7 +113,7 @@ class DryFriction:
         self._warm[: len(left)] = left
         self._find_levels()
 
-    def follow(self, velocity: Sequence[float], load: Sequence[float] = (), held: Sequence[float] = ()) -> bool:
+    def follow(self, velocity: Sequence[float], load: Sequence[float], held: Sequence[float]) -> bool:
         """Bring `levels` and `elastic` up to date for the next step.
 
         Parameters
@@ -136,10 +136,8 @@ class DryFriction:
             self._low[i], self._high[i] = self._bounds[i][way]
             self.levels[i] = self._dynamic[i] if way else self._static[i]
             changed = True
-        if self._varying:
-            self._evaluate(velocity, load, held)
-            changed = True
-        return changed
+        self._evaluate(velocity, load, held)
+        return changed or not self.is_steady
 
     def levels_with_slack(self, transmitted: Sequence[float]) -> list[float]:
         """Levels while a strand is slack, when the sum of both tensions is more than 2 T_0.

@@ -25,16 +25,11 @@ class WatchedLimit(NamedTuple):
         near = f"near its limit of {self.limit:g} {self.unit}{self.where}"
         return f"{self.quantity} is {self.value:.2f} {self.unit}, {near}"
 
-    @property
-    def is_exceeded(self) -> bool:
-        """Whether the quantity is above its limit, or not a number."""
-        return not self.value <= self.limit
-
 
 def excess(watched: Iterable[WatchedLimit], cause: str, **values: Value) -> Event | None:
-    """The fault of the first quantity that is above its limit, with further values; None where none is."""
+    """The fault of the first quantity above its limit, or not a number, with further values; None where none is."""
     for one in watched:
-        if one.is_exceeded:
+        if not one.value <= one.limit:
             names = {"quantity": one.quantity, "unit": one.unit, "where": one.where}
             return fault(cause, value=one.value, allowed=one.limit, **names, **values)
     return None

@@ -313,12 +313,9 @@ class Plant:
         """Give MuJoCo the level of friction of every shaft for the next step."""
         friction, circuits = self._friction, self._circuits
         velocity = self._view.velocities.tolist()
-        if friction.is_steady:
-            changed = friction.follow(velocity)
-        else:
-            changed = friction.follow(velocity, self._transmitted_torque(), self._friction_torque())
-            if friction.elastic:
-                self._view.applied[: 2 * self._n] = friction.elastic  # the rest is of free bodies and doors
+        changed = friction.follow(velocity, self._transmitted_torque(), self._friction_torque())
+        if friction.elastic:
+            self._view.applied[: 2 * self._n] = friction.elastic  # the rest is of free bodies and doors
         if changed or circuits.is_slack or not self._is_set:
             levels = friction.levels_with_slack(circuits.elastic_torque) if circuits.is_slack else friction.levels
             self._is_set = friction.is_steady and not circuits.is_slack

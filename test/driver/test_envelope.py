@@ -221,7 +221,7 @@ def test_joint_limits_and_currents_are_watched() -> None:
     assert ": joint2 is at -2.357 rad, its stop at -2.356 rad" in sentence(beyond)
     near = watched(watch, ARM.joints.start, [0.0, -0.95 * ARM.motors.peak_torque[1] / 0.25, 0.0, 0.0])
     assert list(near) == ["current of motor2"]
-    assert watched(watch, [math.nan] * N)[name].is_exceeded
+    assert excess([watched(watch, [math.nan] * N)[name]], "limit")
 
 
 def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> None:
@@ -229,9 +229,9 @@ def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> 
     at, name = list(ARM.joints.start), "travel of joint2 from the middle of its range"
     at[1] = ARM.joints.upper[1] + 0.02
     watch.begin(np.linalg.solve(np.reshape(ARM.joint_from_motor, (N, N)), at).tolist())
-    assert not watched(watch, at)[name].is_exceeded
+    assert not excess([watched(watch, at)[name]], "limit")
     at[1] += 0.06
-    assert watched(watch, at)[name].is_exceeded
+    assert excess([watched(watch, at)[name]], "limit")
 
 
 def test_an_arm_that_is_driven_into_a_stop_is_stopped() -> None:
