@@ -24,11 +24,11 @@ class WoundCable:
 
     def __init__(self, loss: float) -> None:
         self._loss = 0.5 * loss * CIRCUITS.wound_part
-        self._torque: dict[int, float] = {}
+        self._torque: dict[float, float] = {}
 
     def creep(self, angle: float, travel: float, torque: float) -> float:
         """Creep, rad, at a rotor angle, rad, over a travel, rad, 0 or more, under a torque, N m."""
-        part = math.floor(angle / CIRCUITS.wound_part)
+        part = angle / CIRCUITS.wound_part // 1.0  # not a number where the simulation diverges
         before = self._torque.get(part, 0.0)
         change = (torque - before) * -math.expm1(-CIRCUITS.passages * travel / CIRCUITS.wound_part)
         self._torque[part] = before + change

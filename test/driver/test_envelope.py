@@ -138,12 +138,13 @@ def test_a_push_that_nobody_repeats_ends_after_the_age_of_a_command_and_no_other
     assert [load.cover for load in hardware.plant.loads()] == ["inner_link"]
 
 
+@pytest.mark.parametrize("terminated", [False, True])
 @pytest.mark.parametrize("force", [1e12, 1e300, math.nan])
 def test_a_simulation_that_fails_is_a_fault_with_brakes_and_a_finite_state(
-    force: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    force: float, terminated: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    hardware = enabled()
+    hardware = enabled(**{"driver:effects.terminated": terminated})
     for _ in range(20):
         hardware.command(hardware.stamp, [0.0] * N)
         hardware.advance(0.0)
