@@ -22,8 +22,8 @@ NOT_ESTIMATED = "the estimated contact was not recorded"
 
 
 CUT = (  # off by the recording, or where the signal is missing and comes again
-    ("it began before the recording", "the estimate is missing before it"),
-    ("it lasts beyond the end of the recording", "the estimate is missing after it"),
+    ("the recording begins during it", "the estimate is missing before it"),
+    ("the recording ends during it", "the estimate is missing after it"),
 )
 
 

@@ -253,7 +253,8 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
         found.append(f"command {values['more_force']:g} N")
     if "pin" in values and helps is not PINNED:
         found.append(PINNED)
+    if "searched" in values and "pin" not in values and helps is PINNED:
+        helps = "command another direction"  # a pinned position does not help
     if "searched" in values and not found:
-        helps = "command another direction" if helps is PINNED else helps  # a pinned position would not help either
         return f"neither a force up to 5 times as large nor the turn of a single joint helps; {helps}"
     return ", or ".join([*found, helps])

@@ -236,4 +236,4 @@ def dither_text(timing: Timing) -> str:
     """What the page shows of the dither, whose period is set when the nodes start: the estimator averages over it."""
     if timing.dither_cycle:
         return f"dither: {1.0 / (timing.dither_cycle * timing.period):.0f} Hz"
-    return "dither: off; contacts at rest need timing.dither_cycle=40 from the start"
+    return "dither: off; without joint sensors, contacts at rest need timing.dither_cycle=40 from the start"

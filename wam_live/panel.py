@@ -27,7 +27,7 @@ HINT: Final = "Enable releases the brakes; then drag a link to push it."  # unti
 LEGEND: Final = (  # of the arrows and the range in the scene
     ("&#10145;", "true", "true force (simulator)"),
     ("&#10145;", "estimated", "estimated force"),
-    ("&#9646;", "likely", "where the contact is, with a probability of 90 %"),
+    ("&#9646;", "likely", "90 % range of the contact position"),
     ("&#10145;", "hand", "pull of your hand"),
 )
 BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and its requests

@@ -199,7 +199,10 @@ class RunningArm:
     def newest(self, topic: str) -> Any:
         """The newest message of a topic as a value, None before the first; cheaper than `recorded` in a condition."""
         row, data = self._row(topic), self.recorded.data[topic]
-        return decoder(row, self.configuration.shared, ANY)(data[-1]) if data else None
+        try:
+            return decoder(row, self.configuration.shared, ANY)(data[-1]) if data else None
+        except Refused as reason:
+            raise ArmFault(f"{' and '.join(self.interface.publishers(topic))} published {topic}: {reason}") from None
 
     def status(self, node: str) -> NodeStatus | None:
         """The newest status of a node, None before the first."""
@@ -275,8 +278,8 @@ class RunningArm:
         for topic in self._untaken:
             try:
                 self.newest(topic)
-            except Refused as reason:
-                refused[topic] = f"the test, as no node takes it: {reason}"
+            except ArmFault as fault:
+                refused[topic] = f"the test, as no node takes it: {fault}"
         return refused
 
     def _present_fault(self) -> str:

@@ -51,7 +51,7 @@ POSE = [0.0, -1.2, 0.0, 0.53]
 STEPS = {"push outer": 0.0, "push inner": 2.0, "lower": 4.0, "press 8 N": 5.0, "press 4 N": 7.0, "lift": 9.0}
 REASON = REASONS[Reason.MOMENT_ONLY]
 PARAMETERS = "arm: {joints: "  # not YAML
-NO_LIMIT = "without a commanded force no contact above limits.contact_force: NOT EVALUATED, see below"
+NO_LIMIT = "without a commanded force, contacts stay below limits.contact_force: NOT EVALUATED, see below"
 NO_TASK = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(0), {"kind": np.zeros(0)})  # no axes
 
 
@@ -323,7 +323,7 @@ def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
     summary = AnalysedRecording(with_limits(recording))
     assert summary.unplanned.unknown == ""
     answer = answers(summary)[-1]
-    assert str(answer) == "without a commanded force no contact above 90 N: NO (157 N)"
+    assert str(answer) == "without a commanded force, contacts stay below 90 N: NO (157 N)"
     said = "lift: TOO HARD: a contact with 157 N (true, at 9.60 s)"
     assert any(one.startswith(said) for one in section_of(with_limits(recording), "contact").wrong)
 
@@ -654,7 +654,7 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording = Played()
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
-    answer = "false contact: NOT EVALUATED, false for 200 ms, as the end of a contact may be"
+    answer = "false contact: NOT EVALUATED, only 200 ms, which is normal when a contact ends"
     assert answer in verdict(recording.summary())
 
 

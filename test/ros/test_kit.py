@@ -180,7 +180,8 @@ def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
 
 def test_a_number_that_is_none_is_an_exception_though_no_node_takes_it(arm: RunningArm) -> None:
     arm.start(Unread, nodes=INNER)
-    with pytest.raises(ArmFault, match="share is refused by the test, as no node takes it: effort of joint1 is nan"):
+    words = "share is refused by the test, as no node takes it: unread published share: effort of joint1 is nan"
+    with pytest.raises(ArmFault, match=words):
         arm.run(0.1)
     arm.run_until_refused("share")
     arm.run(0.1)

@@ -79,8 +79,8 @@ def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]], unexplained: fl
     if below := [number for number in numbers if number[2].is_negative]:
         return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
     if math.isnan(numbers[0][2].value):
-        part = f"less than {100.0 * SHAFT.both_ways:g} % of the way is to one side"
-        return f"fewer than {SHAFT.fewest_samples} samples are apart from turns, or {part}"
+        part = f"it moved in one direction for more than {100.0 * (1.0 - SHAFT.both_ways):g} % of its way"
+        return f"{part}, or for fewer than {SHAFT.fewest_samples} samples apart from its reversals"
     finite = _stated([number for number in numbers[:2] if math.isfinite(number[2].error)])
     large = f"the errors are too large{f' ({finite})' * bool(finite)}"
     return f"{large}; the model leaves {100.0 * unexplained:.2g} % of the effort unexplained"

@@ -98,7 +98,7 @@ def _answers(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     if not math.isnan(recording.traces.false_percent):
         yield _false_verdict(recording.traces)
     hard, unknown = recording.unplanned
-    question = "without a commanded force no contact above"
+    question = "without a commanded force, contacts stay below"
     if hard:
         worst = max(hard, key=lambda one: one.force)
         yield VerdictAnswer(f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{worst.force:.0f} N")
@@ -199,7 +199,7 @@ def _false_verdict(traces: Traces) -> VerdictAnswer:
     part, seconds = traces.false_percent, traces.false_seconds
     question = f"at most {TOUCH.false_tolerance:g} % false contact"
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
-        brief = f"false for {1e3 * seconds:.0f} ms, as the end of a contact may be"
+        brief = f"only {1e3 * seconds:.0f} ms, which is normal when a contact ends"
         return VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)
     return VerdictAnswer(question, _yes(part <= TOUCH.false_tolerance), f"{part:.1f} % of the time without one")
 

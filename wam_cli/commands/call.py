@@ -186,8 +186,10 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
         of = f" of {given.count}" if given.count is not None else ""
         waits = f"waiting for message {taken + 1}{of} on {given.topic}"
         if given.timeout is not None and silent > given.timeout:
-            came = f"{taken}{of} messages came on {given.topic}, then none for {given.timeout:g} s (--timeout)"
-            raise TimeoutError(f"{came}{_hint(given.topic, stack)}")
+            came = f"none came on {given.topic}"
+            if taken:
+                came = f"{taken}{of} messages came on {given.topic}, then none"
+            raise TimeoutError(f"{came} for {given.timeout:g} s (--timeout){_hint(given.topic, stack)}")
         if not is_reported and silent > CALL_LIMITS.silence:
             is_reported = True
             row = BY_NAME.get(given.topic)

@@ -267,4 +267,4 @@ def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:
 
 def _margin(scale: float, largest: float = GUARD.largest_scale) -> str:
     """Factor by which the gains may be larger, of which no more than `largest` was tried."""
-    return f"at least {largest:.4g}" if scale >= largest else f"{scale:.4g}"
+    return f"{largest:.4g} or more" if scale >= largest else f"{scale:.4g}"
