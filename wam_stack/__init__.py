@@ -26,7 +26,7 @@ from wam_analysis.identification.fit import identify as _identify
 from wam_analysis.identification.motion import recorded_motion
 from wam_analysis.identification.overlay import model_values
 from wam_analysis.identification.report import report
-from wam_bag.bag import read
+from wam_bag.bag import Bag, read
 from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.guard import Report
@@ -90,12 +90,13 @@ def simulate(
     return run
 
 
-def analyse(recording: str | Path | Mapping[str, Any] | Simulation) -> Analysis:
+def analyse(recording: str | Path | Bag | Mapping[str, Any] | Simulation) -> Analysis:
     """Analyse a recording of this stack or of another robot.
 
     Parameters
     ----------
-    recording : a bag, a CSV file, a table such as a DataFrame, or a simulation, which is played again and recorded.
+    recording : a bag, also as `read` returns it; a CSV file; a table such as a DataFrame; or a simulation, which is
+        played again and recorded.
 
     Raises
     ------
@@ -113,7 +114,7 @@ def analyse(recording: str | Path | Mapping[str, Any] | Simulation) -> Analysis:
             if not np.array_equal(np.transpose(before), [values for name, values in motors.items() if name != "time"]):
                 raise ValueError("the simulation differs when it is played again: play it to its end, by itself")
             return analyse(path)
-    return _analyse(recording, lambda doing: None)
+    return _analyse(recording.path if isinstance(recording, Bag) else recording, lambda doing: None)
 
 
 def guard(configuration: Named = "wam") -> Report:
