@@ -233,11 +233,14 @@ class AnalysedRecording:
         return self.run.braked(self.traces.stamp) & (not estimator.get("use_joint_sensors", True))
 
     @cached_property
+    def seen(self) -> Traces:
+        """The signals, the true force only where it can be estimated."""
+        return self.traces._replace(true=self.traces.true.unknown(self.blind))
+
+    @cached_property
     def touched(self) -> tuple[TouchedLink, ...]:
         """The true contacts, estimated or not."""
-        traces = self.traces
-        seen = traces._replace(true=traces.true.unknown(self.blind))
-        return true_contacts(seen, self.steps)
+        return true_contacts(self.seen, self.steps)
 
     @property
     def missed(self) -> tuple[TouchedLink, ...]:

@@ -107,8 +107,8 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
 SENTENCES: Final = {  # by cause
     # the arm holds
     "error": UNCERTAIN + HELPED,
-    "moved_fast": "when the command came, the arm moved faster than {speed:g} rad/s, so the load on it is not known; "
-    "the arm holds its position, and presses once it is at rest",
+    "moved_fast": "for now: when the command came, the arm moved faster than {speed:g} rad/s, so the load on it is not "
+    "known; the arm holds its position, and presses once it is at rest",
     "task": "{reason}; the arm holds its position",
     "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "
     "arm; until then the arm moves away from the contact, and holds",

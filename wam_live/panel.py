@@ -1,5 +1,6 @@
 """Status, buttons, sliders and plots of the page; what is pressed goes into a queue as requests."""
 
+import contextlib
 import html
 import math
 from collections import deque
@@ -340,8 +341,11 @@ def margin_text(facts: Mapping[str, str]) -> str:
     """The factor by which the gains may be larger, as the guard of the force loop reports it, as HTML."""
     if "margin" not in facts:
         return ""
-    here = facts.get("margin here", facts["margin"])
-    return f" · margin {facts['margin']}" + f" ({here} here)" * (here != facts["margin"])
+    text = f" · margin {facts['margin']}"
+    with contextlib.suppress(KeyError, ValueError):  # where it is no number, only a part of it is known
+        here = float(facts["margin here"])
+        text += f" ({here:.4g} here)" * (here < float(facts["margin"]))
+    return text
 
 
 def dot(level: Level | None) -> str:

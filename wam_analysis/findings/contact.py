@@ -37,6 +37,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"Positions of contacts: {NOT_PLACED}.")
     sentences += [BLIND] * bool(np.any(recording.blind & traces.true.acts))
     sentences += wrong
+    traces = recording.seen
     true, sensed, known = traces.true, traces.estimated, traces.is_compared
     touching = known & true.acts
     if np.any(touching):

@@ -179,7 +179,7 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     wrong = dict.fromkeys(one.link for one in lasting if one.right < TOUCH.lasting)
     shown = f"another link than {', '.join(wrong)}"
     answer = _answer("correct link", [1.0 - one.right for one in lasting], 1.0 - TOUCH.lasting, shown)
-    least = f"{100.0 * min((one.right for one in lasting), default=0.0):.3g} %"
+    least = f"{100.0 * min((one.right for one in lasting), default=0.0):.3g} %, required: {100.0 * TOUCH.lasting:g} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 
