@@ -159,7 +159,7 @@ $(INSTALLED): $(STAMPS)/ros
 	@rm -f $(STAMPS)/installed-* $(STAMPS)/compile-?
 	@$(TIDY)
 ifeq ($(COMPILE),auto)
-	@echo "Compiling the inner loop, where there is a compiler: two minutes or more; COMPILE=0 leaves it as plain Python"
+	@echo "Compiling the inner loop, where there is a compiler: one to several minutes; COMPILE=0 leaves it as plain Python"
 	@rm -f $(COMPILE_LOG).failed
 	@WAM_COMPILE=auto $(REINSTALL) 2>$(COMPILE_LOG) || { mv $(COMPILE_LOG) $(COMPILE_LOG).failed; $(REINSTALL); }
 else
