@@ -43,8 +43,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "frame; `rise`, rise time of the force, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "torque of each joint on the world, N m; the scenario sends it as a `task`",
-    "until_force": "force, N; the step ends when a contact with this force is detected, and fails if there is none; "
-    "if the next step has neither motion nor force, the arm stays there",
+    "until_force": "force, N. The step ends when a contact with this force is detected, and fails if there is none. "
+    "If the next step has neither motion nor force, the arm stays there",
     "chirp": "`{newtons, from, to}`: adds a sine to `force`, in the same direction. `newtons`: amplitude, N. The "
     "frequency goes from `from` to `to`, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes a cover of the simulated arm. "
