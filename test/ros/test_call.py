@@ -195,7 +195,7 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
     waits = f"waiting for message {count + 1} of 200 on status"
     assert err.splitlines() == [
         f"{waits}, which is published when it changes; Ctrl-C ends this",
-        f"wam call: {count} of 200 messages came on status, then none for 3 s (--timeout)",
+        f"wam call: no message came on status for 3 s (--timeout); {count} of 200 came before",
     ]
     assert "argument --timeout: '-1' is not allowed" in called("echo", "status", "--timeout", "-1")[2]
 
@@ -217,7 +217,7 @@ def test_a_topic_on_which_nothing_comes_ends_in_time_with_the_reason(
     assert called("resume")[0] == 0
     assert (code, out) == (1, "")
     topic = words.partition(" ")[0]
-    assert err.splitlines()[-1] == f"wam call: none came on {topic} for 3 s (--timeout); {why}"
+    assert err.splitlines()[-1] == f"wam call: no message came on {topic} for 3 s (--timeout); {why}"
 
 
 def test_messages_are_printed_and_the_time_is_stopped(stack: None) -> None:

@@ -186,10 +186,9 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
         of = f" of {given.count}" if given.count is not None else ""
         waits = f"waiting for message {taken + 1}{of} on {given.topic}"
         if given.timeout is not None and silent > given.timeout:
-            came = f"none came on {given.topic}"
-            if taken:
-                came = f"{taken}{of} messages came on {given.topic}, then none"
-            raise TimeoutError(f"{came} for {given.timeout:g} s (--timeout){_hint(given.topic, stack)}")
+            silence = f"no message came on {given.topic} for {given.timeout:g} s (--timeout)"
+            before = f"; {taken}{of} came before" * bool(taken)
+            raise TimeoutError(f"{silence}{before}{_hint(given.topic, stack)}")
         if not is_reported and silent > CALL_LIMITS.silence:
             is_reported = True
             row = BY_NAME.get(given.topic)
