@@ -12,6 +12,7 @@ from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import BagError
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import FORCE_LOOP
+from wam_description.number_text import apart
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 LIMIT = "limits.contact_force"
@@ -40,8 +41,8 @@ class HardContact(NamedTuple):
         """What was too hard, and when."""
         during = f"{self.step}: " * bool(self.step)
         return (
-            f"{during}TOO HARD: a contact with {self.force:.3g} N ({self.source}, at {self.seconds:.2f} s) while "
-            f"no force was commanded; allowed: {LIMIT}, {self.allowed:g} N."
+            f"{during}TOO HARD: a contact with {apart(self.force, self.allowed, 0)} N ({self.source}, at "
+            f"{self.seconds:.2f} s) while no force was commanded; allowed: {LIMIT}, {self.allowed:g} N."
         )
 
 

@@ -14,6 +14,12 @@ def digits_apart(value: float, other: float) -> int:
     return next((digits for digits in range(2, 6) if brief(value, digits) != brief(other, digits)), 6)
 
 
+def apart(value: float, limit: float, decimals: int = 1) -> str:
+    """A number with at least so many decimals, and with more if it would be written as its limit."""
+    texts = [f"{value:.{more}f}" for more in range(decimals, 6)]
+    return next((text for text in texts if float(text) != limit), texts[0])
+
+
 def as_number(value: Any) -> str:
     """What to write where a text in place of a number looks like one, as a clause of a refusal; '' where it does not.
 

@@ -528,6 +528,8 @@ def test_each_fault_turns_its_own_verdict():
     assert "correct link: NO (another link than " in verdict(link.summary())
     assert "correct link: YES" in verdict(position.summary())
     assert "position within 4 cm: NO (5.0 cm)" in verdict(position.summary())
+    position.set(position.estimated, 0.52, 1.5, "outer_link", (0.0, 11.0, 0.0), 0.3203)
+    assert "position within 4 cm: NO (4.03 cm)" in verdict(position.summary()), "a value that fails is not its limit"
 
 
 def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_their_uncertainty():

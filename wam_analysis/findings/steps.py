@@ -16,6 +16,7 @@ from wam_analysis.traces import Traces
 from wam_analysis.unplanned_contact import LIMIT
 from wam_control.thresholds import MOTION
 from wam_description.event import Code
+from wam_description.number_text import apart, brief, digits_apart
 from wam_sim.reactions import OUTCOMES, STEADY, unmet
 
 HOW = (
@@ -101,7 +102,9 @@ def _answers(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     question = "without a commanded force, contacts stay below"
     if hard:
         worst = max(hard, key=lambda one: one.force)
-        yield VerdictAnswer(f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{worst.force:.0f} N")
+        yield VerdictAnswer(
+            f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{apart(worst.force, worst.allowed, 0)} N"
+        )
     elif unknown:
         yield VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")
 
@@ -110,7 +113,10 @@ def _posture_verdict(errors: Mapping[str, float]) -> VerdictAnswer:
     """Whether the arm came to each commanded posture."""
     missed = {name: error for name, error in errors.items() if error > MOTION.arrived}
     worst = max(errors, key=errors.__getitem__)
-    shown = ", ".join(f"{error:.2g} rad in step {name}" for name, error in (missed or {worst: errors[worst]}).items())
+    shown = ", ".join(
+        f"{brief(error, digits_apart(error, MOTION.arrived))} rad in step {name}"
+        for name, error in (missed or {worst: errors[worst]}).items()
+    )
     return VerdictAnswer(f"posture within {MOTION.arrived:g} rad", _yes(not missed), shown)
 
 
@@ -157,7 +163,7 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     if len(done) < len(held):
         return VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} not applied")
     errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
-    answer = _answer(question, errors, HOLD.force_tolerance, "{:.1f} %")
+    answer = _answer(question, errors, HOLD.force_tolerance, "{} %")
     short = brief + sum(one.hold.is_short for one in done)
     return answer._replace(remark=f"{short} of {len(held) + brief} forces shorter than {STEADY:g} s" * bool(short))
 
@@ -190,7 +196,7 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     errors += [math.nan] * sum(one.lasts for one in recording.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
     unknown = [str(number) for number, one in found if one.estimate.is_lower_bound]
-    answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{:.1f} cm")
+    answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{} cm")
     return answer._replace(remark=f"not known for contact {', '.join(unknown)}" * bool(unknown))
 
 
@@ -201,7 +207,9 @@ def _false_verdict(traces: Traces) -> VerdictAnswer:
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which is normal when a contact ends"
         return VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)
-    return VerdictAnswer(question, _yes(part <= TOUCH.false_tolerance), f"{part:.1f} % of the time without one")
+    return VerdictAnswer(
+        question, _yes(part <= TOUCH.false_tolerance), f"{apart(part, TOUCH.false_tolerance)} % of the time without one"
+    )
 
 
 def _answer(question: str, values: Sequence[float], allowed: float, shown: str) -> VerdictAnswer:
@@ -209,7 +217,7 @@ def _answer(question: str, values: Sequence[float], allowed: float, shown: str) 
     known = [value for value in values if not math.isnan(value)]
     worst = max(known, default=math.nan)
     if worst > allowed:
-        return VerdictAnswer(question, VerdictResult.NO, shown.format(worst))
+        return VerdictAnswer(question, VerdictResult.NO, shown.format(apart(worst, allowed)))
     if not known or len(known) < len(values):
         return VerdictAnswer(question, VerdictResult.NOTHING)
-    return VerdictAnswer(question, VerdictResult.YES, shown.format(worst) * bool(allowed))
+    return VerdictAnswer(question, VerdictResult.YES, shown.format(apart(worst, allowed)) * bool(allowed))
