@@ -253,7 +253,7 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
         found.append(f"command {values['more_force']:g} N")
     if "pin" in values and helps is not PINNED:
         found.append(PINNED)
-    if "searched" in values and "pin" not in values and helps is PINNED:
+    if "no_pin" in values and helps is PINNED:
         helps = "command another direction"  # a pinned position does not help
     if "searched" in values and not found:
         return f"neither a force up to 5 times as large nor the turn of a single joint helps; {helps}"

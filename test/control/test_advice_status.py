@@ -22,6 +22,7 @@ def test_the_status_of_a_refused_force_states_what_would_help() -> None:
     assert run.play() == ""
     refused = [event for event in seen if event.code is Code.REFUSED]
     assert "searched" not in refused[0].values, "at once"
+    assert {"pin", "no_pin"} & set(refused[0].values), "a pinned position is not advised untried"
     assert refused[-1].values["searched"]
     assert {"turn", "more_force", "pin"} & set(refused[-1].values)
 

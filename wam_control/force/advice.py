@@ -49,6 +49,8 @@ def tries(
         return FORCE.reserve * believe(pose, on_links).doubt <= own.limits.doubt
 
     size = force.value or 0.0
+    is_good = not place.is_pinned and is_obeyed(q, [(1.0, pinned)], size)  # first, as a refusal advises it at once
+    yield {"pin": place.position} if is_good else {"no_pin": 1.0}
     for name, was, angle, pose in _turned(q, joints, own.limits.joint_margin):
         is_good = is_obeyed(pose, places, size)
         yield {"turn": name, "turn_from": was, "turn_to": angle} if is_good else {}
@@ -60,8 +62,6 @@ def tries(
         yield {"more_force": larger} if is_good else {}
         if is_good:
             break
-    if not place.is_pinned:
-        yield {"pin": place.position} if is_obeyed(q, [(1.0, pinned)], size) else {}
     yield {"searched": 1.0}
 
 
