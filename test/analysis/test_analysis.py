@@ -545,10 +545,10 @@ def planted() -> Analysis:
     omega = 2.0 * math.pi * 3.1
     position, speed = 0.3 * np.sin(omega * time), 0.3 * omega * np.cos(omega * time)
     torque = 0.8 * np.sign(speed) + 0.4 * speed - 0.12 * omega**2 * position
-    positions = np.column_stack([position, 0.2 + 0.0 * time]) + 1e-6 * rng.standard_normal((len(time), 2))
-    speeds = np.column_stack([speed, 0.0 * time]) + 1e-4 * rng.standard_normal((len(time), 2))
-    efforts = np.column_stack([torque, 0.0 * time]) + 1e-3 * rng.standard_normal((len(time), 2))
-    joints = JointColumns(stamps, stamps, ("",) * len(time), ("elbow", "wrist"), positions, speeds, efforts)
+    positions = np.column_stack([0.2 + 0.0 * time, position]) + 1e-6 * rng.standard_normal((len(time), 2))
+    speeds = np.column_stack([0.0 * time, speed]) + 1e-4 * rng.standard_normal((len(time), 2))
+    efforts = np.column_stack([0.0 * time, torque]) + 1e-3 * rng.standard_normal((len(time), 2))
+    joints = JointColumns(stamps, stamps, ("",) * len(time), ("wrist", "elbow"), positions, speeds, efforts)
     force = np.column_stack([0.0 * time, 1.2 * np.sin(omega * time), 10.0 + 0.0 * time])
     wrench = WrenchColumns(stamps, stamps, ("tool",) * len(time), force, np.zeros_like(force))
     bag = Bag(Path("other"), {"/r/joint_states": joints, "/r/wrench": wrench}, {}, {}, {})
@@ -559,6 +559,6 @@ def test_every_joint_and_the_force_have_a_chart_of_their_own(planted: Analysis) 
     drawn = list(charts(planted))
     assert [chart.title for chart in drawn[:3]] == [
         "elbow over time.", "wrist over time.", "/r/wrench over time.",
-    ]  # fmt: skip
+    ], "of the joints what moved most first"  # fmt: skip
     assert [chart.section for chart in drawn] == ["happened", "happened", "signals"]
     assert max(drawn[0].series[0].values) == pytest.approx(0.3, rel=0.01)

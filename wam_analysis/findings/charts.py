@@ -78,10 +78,19 @@ def _over_time(analysis: Analysis) -> Iterator[Chart]:
 
 
 def _shown(recording: AnalysedRecording) -> list[Source]:
-    """What was measured; of this stack the joints, else the motors."""
+    """What was measured, of each topic what moved most first; of this stack the joints, else the motors."""
     states = [one for one in recording.states if len(one.time) >= STREAM.shown]
     motors = [] if recording.is_foreign else [one for one in states if one.topic.endswith("/motor_states")]
-    return motors if len(motors) == len(states) else [one for one in states if one not in motors]
+    shown = motors if len(motors) == len(states) else [one for one in states if one not in motors]
+    topics = [one.topic for one in shown]
+    return sorted(shown, key=lambda one: (topics.index(one.topic), -_extent(one)))
+
+
+def _extent(one: Source) -> float:
+    """How far a source moved."""
+    values = next(iter(one.values.values()), np.empty(0))
+    known = values[np.isfinite(values)]
+    return float(known.max(initial=-np.inf) - known.min(initial=np.inf))
 
 
 def _forces_over_time(recording: AnalysedRecording) -> Chart | None:
