@@ -30,7 +30,8 @@ class Observation(NamedTuple):
     residual : (n,), N m.
     effects : (n, k), N m, H.
     rest : (n, n), N^2 m^2, R without the noise of the motors that is followed here.
-    moving : (n,), fraction to which each motor moves; more for a filter that averages less of the noise.
+    moving : (n,), fraction to which each motor moves; more for a filter that averages less of the noise.  Empty for
+        joint sensors, which are without this noise.
     pose : (n,), joint angles, rad, as late as the residual.
     lasting : (n, m), N m, torques of those errors of the rest, of one sd, that may stay as they are in a pose.
     """
@@ -111,8 +112,8 @@ class ModelErrors:
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
         effects = seen.effects
-        covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + self._noise_of(seen)
-        return seen.residual - effects.dot(self.errors), covariance
+        covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest
+        return seen.residual - effects.dot(self.errors), self._with_noise(covariance, seen)
 
     def zero(self, seen: Observation) -> None:
         """Take a moment at rest as one of an arm that nothing touches.
@@ -143,13 +144,14 @@ class ModelErrors:
         covariance = np.zeros((size, size))
         covariance.ravel()[:: size + 1] = 1.0  # the diagonal
         covariance[:k, :k] = self.covariance
-        return effects, self.size * covariance, self.size * (seen.rest + self._noise_of(seen))
+        return effects, self.size * covariance, self.size * self._with_noise(seen.rest, seen)
 
-    def _noise_of(self, seen: Observation) -> Array:
-        """Covariance, (n, n), N^2 m^2, of the torques by the noise of the motors."""
+    def _with_noise(self, covariance: Array, seen: Observation) -> Array:
+        """A covariance, (n, n), N^2 m^2, of the torques with that of the motors' noise."""
+        if not seen.moving.size:
+            return covariance
         # dot: of small arrays faster than @, the same bits
-        found: Array = (self._through * (self.noise * seen.moving)).dot(self._through.T)
-        return found
+        return covariance + (self._through * (self.noise * seen.moving)).dot(self._through.T)
 
     def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
         """Learn from what was observed, `span` seconds after the time before; not in contact, and with hindsight."""
