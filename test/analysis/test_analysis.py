@@ -216,8 +216,8 @@ def test_jitter_of_a_real_clock_comes_from_the_times_of_reception(moving: Record
 # forces
 
 
-def pressed(touch: float, impact: float, before: float = 1.0, known: bool = True) -> Section:
-    """A press of 5 N from 1 s on, in contact from `touch` s on; its force swings to `impact` N for 0.04 s at first.
+def pressed(touch: float, impact: float, before: float = 1.0, known: bool = True, held: float = 5.0) -> Section:
+    """5 N are commanded from 1 s on, `held` in contact from `touch` s on; they swing to `impact` N for 0.04 s at first.
 
     Until 1 s the contact has `before` N, which are measured where they are `known`.
     """
@@ -225,7 +225,8 @@ def pressed(touch: float, impact: float, before: float = 1.0, known: bool = True
     time = stamps / 1e9
     commanded = np.where(time >= 1.0, -5.0, 0.0)
     since = time - max(touch, 1.0)
-    pressing = 5.0 * np.clip(since / 0.01, 0.2, 1.0) + (impact - 5.0) * np.sin(np.pi * np.clip(since / 0.04, 0.0, 1.0))
+    swing = (impact - held) * np.sin(np.pi * np.clip(since / 0.04, 0.0, 1.0))
+    pressing = held * np.clip(since / 0.01, 0.2, 1.0) + swing
     force = -np.where(since >= 0.0, pressing, np.where(time >= touch, before, 0.0))
     measured = np.where((since >= 0.0) | known, force, 0.0)
 
@@ -250,6 +251,12 @@ def test_the_impact_of_a_touch_down_is_no_overshoot_of_the_control(touch: float,
     for name in ("overshoot", "rise time 10-90 %"):
         assert math.isnan(found[name].measured)
     assert found["settling time to 5 %"].measured == pytest.approx(0.04, abs=0.006)
+
+
+def test_a_press_that_touches_nothing_holds_no_force_and_has_no_rise_time() -> None:
+    found = {finding.name: finding.measured for finding in pressed(1.0, -0.3, held=-0.3).findings}
+    assert not [name for name in found if "rise" in name or "settling" in name]
+    assert found["largest held force"] == 0.0
 
 
 @pytest.mark.slow

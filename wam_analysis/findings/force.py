@@ -9,8 +9,9 @@ from wam_analysis.findings.prediction import LargestForce, Predicted
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
-from wam_control.force.thresholds import FORCE, GUARD
+from wam_control.force.thresholds import GUARD
 from wam_description.event import Code
+from wam_description.number_text import apart
 from wam_description.signals import BASE
 from wam_sim.reactions import IN_DOUBT, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.reactions import sentences as reaction_sentences
@@ -72,16 +73,16 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     """How far the held forces were from the commanded ones, in a sentence."""
     held = [one for one in held if not one.hold.is_short]
     known = [one for one in held if math.isfinite(one.best.smallest)]
-    touching = [one for one in known if one.largest >= FORCE.touch * one.hold.commanded]
-    applied = [one for one in touching if not one.hold.is_refused]
     if not known:
         return ()
-    text = f"Forces: {len(applied)} of {len(held)} applied"
-    if applied:
-        worst = max(applied, key=lambda one: one.best.smallest / one.hold.commanded)
-        whose = "" if len(worst.true) else "measured "
-        text += f", largest {whose}error {100.0 * worst.best.smallest / worst.hold.commanded:.1f} %"
-    touched = [one.hold.name for one in touching]
+    controlled = [one for one in known if one.is_touching and not one.hold.is_refused]
+    errors = [100.0 * one.best.smallest / one.hold.commanded for one in controlled]
+    reached = sum(error <= HOLD.force_tolerance for error in errors)
+    text = f"Forces: {reached} of {len(held)} within {HOLD.force_tolerance:g} %"
+    if errors:
+        whose = "" if all(len(one.true) for one in controlled) else "measured "
+        text += f", largest {whose}error {apart(max(errors), HOLD.force_tolerance)} %"
+    touched = [one.hold.name for one in known if one.is_touching]
     free = ", ".join(one.hold.name for one in known if one.hold.name not in touched)
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 
@@ -94,7 +95,7 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     limits = [one.largest for one in recording.theories.values() if one.largest and math.isfinite(one.largest.force)]
     limit = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
     smallest = max(one.best.smallest for one in known) or math.nan
-    largest = max(one.hold.commanded + one.best.bias for one in known)
+    largest = max(0.0, *(one.hold.commanded + one.best.bias for one in known))
     by = f"limited by {limit.limited_by}" if limits else ""
     return [
         Finding("largest error, bias plus ripple", "N", smallest),

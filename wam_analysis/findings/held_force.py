@@ -28,6 +28,7 @@ from wam_analysis.thresholds import CYCLE, HOLD, SHAFT, TOUCH
 from wam_analysis.traces import Traces
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import JointColumns
+from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
@@ -107,7 +108,12 @@ class HeldForce(NamedTuple):
     @property
     def largest(self) -> float:
         """The largest magnitude of that force, N."""
-        return float(np.nanmax(np.abs(self.true if len(self.true) else self.measured)))
+        return float(np.nanmax(np.abs(self.true if len(self.true) else self.measured), initial=0.0))
+
+    @property
+    def is_touching(self) -> bool:
+        """Whether something was touched."""
+        return self.largest >= FORCE.touch * self.hold.commanded
 
 
 def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
@@ -127,7 +133,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     if hold.is_refused:
         return held
     touched = _touch_down(traces, parameters, hold)
-    response = _response(hold, time, measured, HOLD.steady * duration)
+    response = _response(hold, time, measured, HOLD.steady * duration) if held.is_touching else None
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     steady, late = ((1.0 - part) * duration for part in (HOLD.steady, CYCLE.late_part))

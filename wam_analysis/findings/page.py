@@ -122,7 +122,7 @@ def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
     if section.lacking:
         lacking = f'<p class="lacking"><small>Not in this bag: {html.escape(", ".join(section.lacking))}.</small></p>'
     numbers = tabulated(section.findings)
-    tables = "".join(map(_table, numbers)) + "".join(f"<p><small>{text}.</small></p>" for text in legends(numbers))
+    tables = "".join([*(f"<p><small>{text}.</small></p>" for text in legends(numbers)), *map(_table, numbers)])
     return (
         f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2><ul>{sentences}</ul>'
         f"{tables}{_notes(section.findings)}{figures}{lacking}</section>"

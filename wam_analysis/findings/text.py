@@ -49,7 +49,7 @@ def _table_lines(findings: Sequence[Finding], wide: int) -> list[str]:
     tables = tabulated(findings)
     blocks = [block for table in tables for block in _blocks(table, wide)]
     lines = [line for block in blocks for line in ("", *(f"  {line}".rstrip() for line in block))]
-    return lines + [line for legend in legends(tables) for line in _wrapped(legend, wide)]
+    return [line for legend in legends(tables) for line in _wrapped(legend, wide)] + lines
 
 
 def _blocks(table: Table, wide: int) -> Iterator[list[str]]:
