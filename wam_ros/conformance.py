@@ -273,9 +273,9 @@ def _claims(bench: DriverBench) -> str:
 
 def _agreement(bench: DriverBench) -> str:
     bench.enable()
-    bench.report(node="transform", started_with="one")
+    bench.report(node="transform", started_with=bench.digests)
     bench.watch(CONFORMANCE_LIMITS.settle)
-    bench.report(started_with="another")
+    bench.report(started_with=bench.digests[:-1] + "?")
     try:
         return bench.in_mode("fault") or _enabled_after_reset(bench)
     finally:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from rclpy.node import Node
 
-from wam_description.agreement import DIGESTS
+from wam_description.agreement import DIGESTS, digests
 from wam_description.arm import Shared
 from wam_description.driver_contract import REPLY, SENT, SERVICES, TAKEN, DriverContract
 from wam_description.event import Level
@@ -79,6 +79,7 @@ class DriverBench(StackClient):
         super().__init__(namespace, "velocity_loop", connection, shared)
         self.contract = DriverContract.of(shared, share)
         self._arm, self._timing, self._current = shared.arm, shared.timing, current
+        self.digests = digests(shared)
         self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
         self.carrying = [0.0] * len(self.contract.motors)
         self.commanded = list(self.carrying)
