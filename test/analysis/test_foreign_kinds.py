@@ -91,6 +91,10 @@ def wraps() -> list[Case]:
              sine(0.2, 20.0) | FRICTION, said),
         Case("in degrees", ros1, degrees, sine(0.25, largest), said, DEGREES),
         Case("position alone", by_rosbags, alone, sine(0.3, 5.0), said),
+        Case("an encoder behind a gear", sqlite, one("/joint_states", 100.0, 0.3, 2.5, wrapped(-0.6, 1.2)),
+             sine(0.3, 2.5) | FRICTION, said),
+        Case("a counter of 16 bits", by_mcap_ros2, one("/joint_states", 100.0, 0.3, 5e5, wrapped(-32768.0, 65536.0)),
+             sine(0.3, 5e5), said),
     ]  # fmt: skip
 
 

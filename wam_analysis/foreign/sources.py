@@ -337,7 +337,7 @@ def _treated(one: Source) -> Source:
             treated.append(Treated(Treatment.SPARSE, quantity, lacking, len(value)))
     if "position" in values and one.units["position"] == "rad":
         known = np.isfinite(values["position"])
-        unwrapped, wraps, turn = _unwrapped(one.time[known], values["position"][known])
+        unwrapped, wraps, turn = _unwrapped(one.time[known], values["position"][known], one.is_command)
         if wraps:
             values["position"] = values["position"].copy()
             values["position"][known] = unwrapped
@@ -376,10 +376,19 @@ def _held_over(value: Numbers) -> Mask:
     return since % math.ceil(np.quantile(apart, STREAM.evenly)) > 0
 
 
-def _unwrapped(time: Numbers, position: Numbers) -> tuple[Numbers, int, float]:
+def _overflow(position: Numbers) -> float:
+    """After what a counter begins again, NaN if it does not: there it jumps against the steps before and after."""
+    steps = sliding_window_view(np.pad(np.diff(position), 2), 3).T
+    before, jumps, after = steps[:, np.abs(steps[1]) > STREAM.wraps * np.ptp(position)]
+    is_against = np.maximum(before * jumps, after * jumps) < 0.0
+    is_counter = len(jumps) and np.mean(is_against) >= STREAM.evenly
+    return float(np.median(np.abs(jumps - 0.5 * (before + after)))) if is_counter else math.nan
+
+
+def _unwrapped(time: Numbers, position: Numbers, is_command: bool) -> tuple[Numbers, int, float]:
     """An angle without its wraps, their number and the turn: it stays within a turn and jumps by nearly one."""
     steps = np.diff(position)
-    for turn in STREAM.turns:
+    for turn in (*STREAM.turns, math.nan if is_command else _overflow(position)):  # a command may jump
         jumps = (np.abs(steps) > STREAM.wraps * turn) & ~after_gaps(time)[1:]
         if not np.any(jumps) or np.ptp(position) > STREAM.within * turn:
             continue
