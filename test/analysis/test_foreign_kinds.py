@@ -274,6 +274,12 @@ def still() -> list[Case]:
         with_flicker(by_rosbags, 1, 1e-4, 0.0),
         with_flicker(sqlite, 2, 1e-3, 1e-4),
         with_flicker(ros1, 3, 2e-5, 1e-3),
+        *(Case(f"a gripper, {rate:g} Hz", by_rosbags,
+               joints("/joint_states", time, ["a"], position=0.04 * (time[:, None] // 7.7 % 2.0), **given),
+               {"a: motions": 7.0}, wrong)
+          for rate, wrong in ((50.0, ""), (100.0, "the velocity is 0"))
+          for time in [np.arange(0.0, 60.0, 1.0 / rate)]
+          for given in [{"velocity": np.zeros((len(time), 1))} if wrong else {}]),
     ]  # fmt: skip
 
 

@@ -408,8 +408,7 @@ def _jumps(shown: Source) -> Numbers:
     if len(position) < SHAFT.fewest_samples:
         return result
     steps, waits, finest = np.diff(position), np.diff(shown.time), 0.0
-    if "velocity" in shown.values:
-        velocity = shown.values["velocity"]
+    if np.any(velocity := shown.values.get("velocity", np.zeros(1))):
         moved = 0.5 * (velocity[1:] + velocity[:-1]) * waits
     else:
         rates = np.pad(steps / waits, STREAM.around, "edge")
@@ -505,7 +504,9 @@ def resolution(value: Numbers) -> float:
         return 0.0
     quantum = float(np.min(steps))
     counts = steps / quantum
-    is_rounded = bool(np.all(np.abs(counts - np.rint(counts)) < 0.05)) and float(np.median(counts)) < 1e3
+    # from place to place, to stay there, as a gripper does: no flicker of an encoder
+    is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(np.diff(value)) < np.std(value)
+    is_rounded = not is_step and np.all(np.abs(counts - np.rint(counts)) < 0.05) and float(np.median(counts)) < 1e3
     sd = float(noise(value))
     # of fourth differences: with few samples in a period the second ones are of the motion
     if len(value) > SHAFT.fewest_samples:
