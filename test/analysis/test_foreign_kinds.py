@@ -348,6 +348,8 @@ def contradictions() -> list[Case]:
     position[:, 1], velocity[:, 1] = buzz, 0.0
     quiet = joints("/joint_states", time, ["a", "b"], position=position, velocity=velocity, effort=effort)
     both.append(Case("one that buzzes", by_rosbags, quiet, sine(0.7, 0.5) | FRICTION))
+    both += [Case(f"{rate:g} Hz", sqlite, one("/joint_states", rate, 0.01 * rate, 0.5, None, 600.0 / rate),
+                  {"/joint_states: period": 1e3 / rate}) for rate in (1.0, 0.2)]  # fmt: skip
     others = [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), scaled(0.85, sqlite, 200.0), *both]
     scales = [
         *others,

@@ -129,7 +129,7 @@ def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
     """
     time, velocity = piece.time, piece.values["velocity"]
     period = float(time[1] - time[0])
-    width = round(SHAFT.way / period)
+    width = max(1, round(SHAFT.way / period))
     if len(time) <= width:
         return None
     moved, by = ways(piece, width)
@@ -137,7 +137,7 @@ def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
     far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
     allowed = SHAFT.agree * far + SHAFT.longest_effort_lag * np.abs(change) + SHAFT.joint_rest * SHAFT.way
     excess = np.abs(moved - by) - allowed - SHAFT.noisy * piece.noise["position"]
-    if np.sum(excess > 0.0) < width // 2:
+    if 2 * np.sum(excess > 0.0) < width:
         return None
     worst = int(np.argmax(excess))
     return float(time[worst]), float(moved[worst]), float(by[worst])
