@@ -220,6 +220,7 @@ class StreamThresholds:
     near: int = 20  # messages on both sides of a stamp that goes back, whose ages show whether the clock was set back
     faster: float = 30.0  # times the receptions: stamps that go on so fast are not in s
     slowest: float = 0.5  # s from message to message: fewer messages are hardly those of a robot
+    quickest: float = 2e-5  # s from message to message: nor are more messages
     usual: float = 0.01  # s from message to message, by which the unit of stamps is guessed
     latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
     seconds: float = 1e17  # a time below this is in seconds or less, above it in ns since 1970

@@ -536,6 +536,8 @@ TABLES = {
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "dates": Written(times=date),
     "dates of a zone": Written(times=lambda time: f"{date(time)}+02:00"),
+    "dates of two zones": Written(times=lambda time: f"{date(time)}Z" if time < 9 else f"{date(time - 3600)}-01:00"),
+    "hours": Written(("time [h]", *WITH_UNITS[1:]), (3600.0, *OTHER_UNITS[1:])),
     "dates as Python logs them": Written(times=lambda time: date(time).replace("T", " ").replace(".", ",")),
     "a row of units": Written(units=OTHER_UNITS, below="ms,deg,deg/s,mA\n"),
     "some rows without a time": Written(times=lambda time: "" if round(100.0 * time) % 1000 == 7 else time),
@@ -576,9 +578,10 @@ def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: P
     assert ("is computed from the position: a." in told) is not any("velocity" in one for one in titles)
     assert ("Not used" in analysis.sections[0].sentences[0]) is ("speed" in titles)
     assert "joints: reception jitter" not in numbers
+    assert analysis.recording.duration == pytest.approx(29.99, abs=0.02)
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9), ("day", 1.0 / 86400.0)])
 def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given(unit: str, factor: float) -> None:
     titles, columns = table_of(Written(units=(1.0 / factor, 1.0, 1.0, 1.0)))
     table = dict(zip(titles, columns, strict=True))
@@ -600,6 +603,11 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
             "time,position.a\n0,1\n0.1,ERR\n",
             NOTHING,
             "'position.a': a cell has 'ERR', which is no number; leave it empty, or",
+        ),
+        (
+            "time,position.a\n0,1\n# end,\n",
+            NOTHING,
+            "'time': a cell has '# end', which is no number; .* dates are read",
         ),
         ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
         (

@@ -50,14 +50,16 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
             return numbers.astype(np.int64)
         step = float(np.median(np.diff(np.sort(numbers)))) if len(numbers) > 1 else 0.0
         took = 0.0 if received is None else float(np.ptp(received)) / 1e9
-        is_slower = step >= STREAM.slowest and float(np.ptp(numbers)) > STREAM.faster * took
-        if is_slower or np.max(numbers) > STREAM.latest:
+        whole = float(np.ptp(numbers))
+        is_slower = step >= STREAM.slowest and whole > STREAM.faster * took
+        if is_slower or 0.0 < whole < STREAM.quickest * len(numbers) or np.max(numbers) > STREAM.latest:
             likely = min(
-                ("ms", "us", "ns"), key=lambda unit: abs(math.log(max(UNITS[unit][0] * step, 1e-9) / STREAM.usual))
+                ("ms", "us", "ns", "h", "day"),
+                key=lambda unit: abs(math.log(max(UNITS[unit][0] * step, 1e-9) / STREAM.usual)),
             )
             raise ValueError(
                 f"{label} increases by {shown(step)} from message to message, so it is hardly in s; give --unit "
-                f"stamp={likely}, or another one of s, ms, us, ns or a factor"
+                f"stamp={likely}, or another one of s, ms, us, ns, h, day or a factor"
             )
     return np.asarray(np.rint(BILLION * given.scaled("stamp")[0] * numbers), np.int64)
 

@@ -3,6 +3,7 @@
 import csv
 import math
 import re
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -20,7 +21,6 @@ from wam_bag.columns import JOINT_FIELDS, joint_names
 
 TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](?!\d+[\])])(.*)[\])]\s*)?")  # and the unit behind it; q[0] has none
 ABOVE = re.compile(r"#|sep=")  # begins a line above the titles
-ZONE = re.compile(r"(Z|[+-]\d\d:\d\d)$")  # of a time of day, behind it
 DELIMITERS = ",;\t|"  # or blanks, if the titles have none of these
 NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was not recorded
 COMMANDED = "command."  # begins the title of a column that was commanded
@@ -53,7 +53,7 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
         )
-    if any(map(str.strip, rows[0])) and not any(map(_is_value, rows[0])):
+    if not any(map(str.isdecimal, "".join(rows[0]))):
         units, *rows = rows  # below the titles
         head = [
             f"{title} [{unit.strip()}]" if unit.strip() else title for title, unit in zip(head, units, strict=False)
@@ -264,11 +264,6 @@ def _number(text: str) -> float:
         return np.nan
 
 
-def _is_value(cell: str) -> bool:
-    """Whether a cell is a number, a date or nan, and no unit."""
-    return not math.isnan(_number(cell)) or cell.strip().lower() == "nan" or any(map(str.isdigit, cell))
-
-
 def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     """Times of the rows that have one, ns, and which these are: of numbers, or of dates."""
     dates = np.asarray(column)
@@ -277,12 +272,13 @@ def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
         return dates[known].astype(f"{dates.dtype.kind}8[ns]").astype(np.int64), known
     try:
         numbers = _numbers(column)
-    except BagError:
-        numbers = np.full(len(dates), np.nan)
+    except BagError as error:
+        try:
+            with warnings.catch_warnings(action="ignore"):  # that numpy turns times of a zone to UTC
+                return _times(label, np.array([str(one).replace(",", ".") for one in column], "M8[ns]"), given)
+        except ValueError:
+            raise BagError(f"{label}: {error}; dates are read as 2026-05-01T12:00:00.5") from None
     known = np.isfinite(numbers)
-    if np.any(known):
-        return nanoseconds(label, numbers[known], given), known
-    try:
-        return _times(label, np.array([ZONE.sub("", str(one)).replace(",", ".") for one in column], "M8[ns]"), given)
-    except ValueError:
-        raise BagError(f"{label} has no times") from None
+    if not np.any(known):
+        raise BagError(f"{label} has no times")
+    return nanoseconds(label, numbers[known], given), known
