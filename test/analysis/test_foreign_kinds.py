@@ -270,10 +270,13 @@ def still() -> list[Case]:
     return [
         Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
              {"a: frequency": 0.3}, "", NOTHING,
-             ("a: moved by 0.00614 rad, more slowly than the noise of its velocity.",)),
+             ("a: moved by 0.00614 rad, more slowly than the noise of its velocity, or too briefly.",)),
         with_flicker(by_rosbags, 1, 1e-4, 0.0),
         with_flicker(sqlite, 2, 1e-3, 1e-4),
         with_flicker(ros1, 3, 2e-5, 1e-3),
+        Case("a valve", sqlite,
+             joints("/s", range(600), ["a"], position=np.arange(600)[:, None] // 200 % 2, velocity=np.zeros((600, 1))),
+             {"a: motions": 2.0}, "the velocity is 0"),
         *(Case(f"a gripper, {rate:g} Hz", by_rosbags,
                joints("/joint_states", time, ["a"], position=0.04 * (time[:, None] // 7.7 % 2.0), **given),
                {"a: motions": 7.0}, wrong)

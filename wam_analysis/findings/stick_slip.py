@@ -27,7 +27,9 @@ def stick_section(recording: AnalysedRecording) -> Section:
             continue
         if not found.slips and (distance := hidden_motion(one)):
             far = shown(distance, one.units["position"])
-            sentences.append(f"{one.label}: moved by {far}, more slowly than the noise of its velocity.")
+            sentences.append(
+                f"{one.label}: moved by {far}, more slowly than the noise of its velocity, or too briefly."
+            )
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),

@@ -570,11 +570,11 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
             moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["position"] / (width * period))
             parts.append(np.column_stack([mean, rate, np.gradient(rate, period)])[moves])
     velocity, rate, change = np.vstack(parts).T
+    if len(rate) and not np.any(recorded := shown.values["velocity"]):
+        return 0.0, Treated(Treatment.UNFILLED, "velocity")
     if len(rate) < SHAFT.fewest_samples:
         return math.nan, None
-    columns, recorded = np.column_stack([rate, change]), shown.values["velocity"]
-    if not np.any(recorded):
-        return 0.0, Treated(Treatment.UNFILLED, "velocity")
+    columns = np.column_stack([rate, change])
     now, before = np.linalg.lstsq(columns, velocity, rcond=None)[0]
     kept, lost, slope, left = (
         float(np.linalg.norm(each) / np.linalg.norm(rate))
