@@ -612,6 +612,7 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
             NOTHING,
             "'time': a cell has '# end', which is no number; .* dates are read",
         ),
+        ('time,position.a,velocity.a,effort.a\n0,"1,2,3\n' + 2**15 * "1,1,2,3\n", NOTHING, "cell has '1,2,3', which"),
         ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
         (
             "time,position.a\n" + 2 * "".join(f"{i},1\n" for i in range(200)),
