@@ -367,9 +367,9 @@ def _held_over(value: Numbers) -> Mask:
     apart, sizes = np.diff(changed), steps[changed - 1]
     if len(apart) < SHAFT.fewest_samples or np.any(np.isnan(steps)):
         return np.zeros(len(value), np.bool_)
-    often = float(np.median(apart))
+    often = np.median(apart)
     is_even = np.mean((apart > 1) & (np.abs(apart - often) <= 1.0)) >= STREAM.evenly
-    if not is_even or float(np.median(sizes)) < STREAM.counts * float(np.min(sizes)):
+    if not is_even or np.median(sizes) < STREAM.counts * np.min(sizes):
         return np.zeros(len(value), np.bool_)
     row = np.arange(len(value))
     since = row - np.concatenate([[0], changed])[np.searchsorted(changed, row, side="right")]
@@ -377,11 +377,16 @@ def _held_over(value: Numbers) -> Mask:
 
 
 def _overflow(position: Numbers) -> float:
-    """After what a counter begins again, NaN if it does not: there it jumps against the steps before and after."""
+    """After what a counter begins again, NaN if it does not: there it jumps against the steps before and after.
+
+    Its other steps are small: those of noise have any size.
+    """
     steps = sliding_window_view(np.pad(np.diff(position), 2), 3).T
-    before, jumps, after = steps[:, np.abs(steps[1]) > STREAM.wraps * np.ptp(position)]
+    sizes, reach = np.abs(steps[1]), np.ptp(position)
+    before, jumps, after = steps[:, sizes > STREAM.wraps * reach]
+    others = np.count_nonzero(sizes > (1.0 - STREAM.wraps) * reach) - len(jumps)
     is_against = np.maximum(before * jumps, after * jumps) < 0.0
-    is_counter = len(jumps) and np.mean(is_against) >= STREAM.evenly
+    is_counter = len(jumps) > 0 == others and np.mean(is_against) >= STREAM.evenly
     return float(np.median(np.abs(jumps - 0.5 * (before + after)))) if is_counter else math.nan
 
 
@@ -415,8 +420,8 @@ def _jumps(shown: Source) -> Numbers:
         moved = np.median(sliding_window_view(rates, 2 * STREAM.around + 1), axis=1) * waits
         finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
     rest = steps - moved
-    usual = STREAM.zero * max(float(np.quantile(np.abs(rest), 1.0 - STREAM.repeated)), finest)
-    least = max(STREAM.beyond * float(np.max(np.abs(moved))), usual, SHAFT.joint_rest)
+    usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
+    least = max(STREAM.beyond * np.max(np.abs(moved)), usual, SHAFT.joint_rest)
     jumps = (np.abs(rest) > least) & ~after_gaps(shown.time)[1:]
     if np.sum(jumps) <= STREAM.repeated * len(steps):
         result[1:][jumps] = rest[jumps]
@@ -506,11 +511,11 @@ def resolution(value: Numbers) -> float:
     counts = steps / quantum
     # from place to place, to stay there, as a gripper does: no flicker of an encoder
     is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(np.diff(value)) < np.std(value)
-    is_rounded = not is_step and np.all(np.abs(counts - np.rint(counts)) < 0.05) and float(np.median(counts)) < 1e3
-    sd = float(noise(value))
+    is_rounded = not is_step and np.all(np.abs(counts - np.rint(counts)) < 0.05) and np.median(counts) < 1e3
+    sd = noise(value)
     # of fourth differences: with few samples in a period the second ones are of the motion
     if len(value) > SHAFT.fewest_samples:
-        sd = min(sd, float(noise(np.diff(value, n=2))) * math.sqrt(6.0 / 70.0))
+        sd = min(sd, noise(np.diff(value, n=2)) * math.sqrt(6.0 / 70.0))
     return max(sd, quantum / math.sqrt(12.0) if is_rounded else 0.0)
 
 

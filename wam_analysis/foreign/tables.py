@@ -48,9 +48,8 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     if len(lines) < 2:
         raise BagError(f"{path} has no row below the names of its columns")
     delimiter = max(DELIMITERS, key=lines[0].count) if any(map(lines[0].count, DELIMITERS)) else " "
-    blanks = delimiter == " "
     # line by line, so that a quote that is not closed ends with its row
-    head, *rows = (next(csv.reader([line], delimiter=delimiter, skipinitialspace=blanks)) for line in lines)
+    head, *rows = (next(csv.reader([line], delimiter=delimiter, skipinitialspace=delimiter == " ")) for line in lines)
     if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
