@@ -142,7 +142,7 @@ def _finder(topic: Topic, arm: Arm) -> Decode:
     known: list[tuple[Callable[[bytes], Numbers | None], Callable[[Numbers], Any]]]
     if topic.type == JOINT_STATE:
         names = owners(topic, arm)
-        known = [(joint_states(names, counts).numbers, State._make) for counts in product((len(names), 0), repeat=3)]
+        known = [(joint_states(names, counts).numbers, _as_state) for counts in product((len(names), 0), repeat=3)]
     elif topic.type == WRENCH:
         known = [(wrenches(frame).numbers, partial(_as_wrench, frame)) for frame in frames(arm)]
     else:  # points, which no node takes in every period
@@ -159,6 +159,10 @@ def _finder(topic: Topic, arm: Arm) -> Decode:
         return None
 
     return find
+
+
+def _as_state(numbers: Numbers) -> State:
+    return State(*map(list, numbers))
 
 
 def _as_wrench(frame: str, numbers: Numbers) -> Wrench:
