@@ -17,11 +17,18 @@ import simulation  # noqa: E402
 MAY_BE_ZERO = ("periods kept", "late cycles", "braked")
 
 
-@pytest.mark.parametrize("name", bench.BENCHMARKS)
-def test_benchmark_prints_a_ratio_in_every_row(name: str, domain_id: int) -> None:
+INSTALLED = simulation.installed()
+IS_INSTALLED = pytest.mark.skipif(INSTALLED is None, reason="the compiled packages of this source are not installed")
+
+
+@pytest.mark.parametrize(
+    ("name", "packages"),
+    [*((name, ROOT) for name in bench.BENCHMARKS), pytest.param("round_trip", INSTALLED, marks=IS_INSTALLED)],
+)
+def test_benchmark_prints_a_ratio_in_every_row(name: str, packages: Path, domain_id: int) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "benchmarks" / "bench.py", "--benchmarks", name, "--quick", "--fresh"],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(packages)},
         capture_output=True,
         text=True,
         timeout=LONG,
@@ -31,7 +38,7 @@ def test_benchmark_prints_a_ratio_in_every_row(name: str, domain_id: int) -> Non
     rows = [line.split(" | ") for line in done.stdout.splitlines() if line.startswith(f"| {name}: ")]
     ratios = {cells[0].removeprefix(f"| {name}: "): cells[4] for cells in rows}
     expected = [ratio.name for ratio in bench.load(name).ratios]
-    if name == "compiled" and simulation.installed() is None:
+    if name == "compiled" and INSTALLED is None:
         expected = [row for row in expected if row.endswith("plain Python")]
     for row in expected:
         assert float(ratios.pop(row)) > 0.0 or row.startswith(MAY_BE_ZERO), done.stdout
