@@ -465,6 +465,16 @@ def test_a_fault_is_read_right_and_said(case: Case, tmp_path: Path) -> None:
     assert all(sentence in every for sentence in case.absent)
 
 
+def test_messages_that_come_all_at_once_after_a_pause_show_no_motion(tmp_path: Path) -> None:
+    time, *values = motion(100.0, 0.5, 0.5)
+    time = np.append(time, np.linspace(32.0, 32.001, 30))
+    q, v, effort = (np.append(value, value[:30])[:, None] for value in values)
+    sent = joints("/joint_states", time, ["a"], position=q, velocity=v, effort=effort)
+    sections = analyse(sqlite(tmp_path / "bag", sent), lambda doing: None).sections
+    numbers = {one.name: one.measured for section in sections for one in section.findings}
+    assert {name: numbers[name] for name in FRICTION} == pytest.approx(FRICTION, rel=0.02)
+
+
 def test_shafts_of_motors_may_turn_often_and_fast(tmp_path: Path) -> None:
     sent = [s._replace(fields={"name": ["motor1"], "position": s.fields["position"]})
             for s in one("/joint_states", 100.0, 0.7, 20.0)]  # fmt: skip

@@ -479,13 +479,14 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
     inner = (np.flatnonzero(steps > STREAM.filled * period) + 1).tolist()
     found = []
     for begin, end in zip([0, *inner], [*inner, len(source.time)], strict=True):
-        if end - begin < SHAFT.fewest_samples:
-            continue
         time = source.time[begin:end]
+        count = round((time[-1] - time[0]) / period) + 1
+        if min(len(time), count) < SHAFT.fewest_samples:
+            continue
         values = {q: v[begin:end] for q, v in source.values.items()}
         stamps, recorded = time, values
         if float(np.max(np.abs(np.diff(time) - period))) > STREAM.irregular * period:
-            even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
+            even = np.linspace(time[0], time[-1], count)
             values = {q: np.interp(even, time, v) for q, v in values.items()}
             time = even
         sd = {q: resolution(v) for q, v in values.items()}
