@@ -164,7 +164,7 @@ TURNED: Final = "a force in the frame of a link turns with it"
 HIDDEN: Final = {  # by what measures the force: what else may explain the torques, and what to do about it
     "motors": (", friction of motors at rest hides a part of it", ", use the dither (timing.dither_cycle=40)")
 }
-SINCE: Final = ("without a contact", "since the force was last within its tolerance")
+SINCE: Final = ("without reaching it", "since the force was last within its tolerance")
 REACH: Final = (
     "nothing is touched; bring the arm to the surface first, or command more force",
     "command a force that the arm can reach",
@@ -227,7 +227,7 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     way, source = values.get("way", 0.0), values.get("source", "")
     found = {
         "travel": f"{abs(way):.3g} m {'against' if way < 0.0 else 'along'}",
-        "since": SINCE[has_touched],
+        "since": SINCE[values.get("has_settled", 0.0) > 0.0],
         "reach": REACH[2 if is_pulled else has_touched],
         "calm": CALM[is_motors],
         "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,

@@ -262,9 +262,9 @@ class ForceWatch:
             self._travel = 0.0 if seen.is_led else min(self._travel, 0.0)
         if abs(self._travel) <= own.limits.free_travel:
             return None
-        touched = float(self.touch.has_been)
+        settled = float(self._has_settled)
         return holding(
-            Code.AT_LIMIT, "free_travel", way=self._travel, allowed=own.limits.free_travel, has_touched=touched
+            Code.AT_LIMIT, "free_travel", way=self._travel, allowed=own.limits.free_travel, has_settled=settled
         )
 
     def _unexplained(
