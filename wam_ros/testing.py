@@ -322,8 +322,8 @@ class RunningArm:
         ----------
         topic : name in the table of topics.
         value : State, Wrench, Point, Table or PosturePath.
-        seconds : arm's time in which it is sent again with each joint state, as a command is valid for a short time
-            only; 0 sends it once.
+        seconds : arm's time in which it is sent again with each joint state; 0 sends it once, and the force loop
+            ignores a single command.
         fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.
 
         Raises
@@ -451,7 +451,10 @@ def configured(
 def playing(steps: Sequence[Mapping[str, Any]], folder: Path, *own: Any, **start: Any) -> Configuration:
     """`configured` with a scenario of these steps and a recorder, whose bag is ``folder/bag``."""
     script = folder / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": list(steps)}), encoding="utf-8")
+    try:
+        script.write_text(yaml.safe_dump({"steps": list(steps)}), encoding="utf-8")
+    except yaml.YAMLError as error:
+        raise ParameterError(f"the steps contain {error.args[1]!r}; give mappings as a scenario file has") from None
     recorder = {"directory": str(folder), "name": "bag", **start.pop("recorder", {})}
     return configured("scenario", "recorder", *own, scenario={"script": str(script)}, recorder=recorder, **start)
 

@@ -219,6 +219,11 @@ def test_a_scenario_that_fails_is_an_exception(arm: RunningArm) -> None:
         arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])
 
 
+def test_steps_that_no_file_can_contain_are_refused(arm: RunningArm) -> None:
+    with pytest.raises(ParameterError, match=r"the steps contain <object.*; give mappings as a scenario file has"):
+        arm.play([object()])  # type: ignore[list-item]
+
+
 def test_nested_values_and_a_class_in_the_place_of_a_node_make_a_configuration() -> None:
     made = configured(force_loop=Damping, damping={"damping": 2.0}, arm={"joints": {"start": [0.1] * 4}})
     assert made.shared.arm.joints.start == (0.1,) * 4
