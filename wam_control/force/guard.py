@@ -27,7 +27,7 @@ from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 from wam_description.transmission_map import TransmissionMap
 
-UNKNOWN: Final = "not assessed yet, as no force was commanded; the margin is that of the posture under `worst`"
+UNKNOWN: Final = "not assessed yet, as no force was commanded; the margin is that of `worst case`"
 Triple = tuple[float, float, float]
 
 
