@@ -57,7 +57,7 @@ def test_the_arm_that_is_chosen_is_replayed(
 ) -> None:
     printed, _ = ended(capsys, "replay", bag, "gravity", "--config", "wam", "--namespace", chosen)
     assert f"this is /{chosen} alone; other arms in this bag: --namespace {other}" in printed
-    assert f"; 0 only recorded, {MESSAGES['/' + chosen]} only replayed" in printed
+    assert f"0 messages both recorded and replayed; 0 only recorded, {MESSAGES['/' + chosen]} only replayed" in printed
 
 
 @pytest.mark.parametrize(("chosen", "length"), [("left", "0.145 s"), ("right", "0.195 s")])

@@ -86,13 +86,13 @@ def reasons(done: Replay) -> list[str]:
 
 def stated(topic: Compared) -> str:
     """A line about a topic, a second one about its first difference."""
-    line = f"{topic.topic}: {topic.compared} messages, "
+    line = f"{topic.topic}: {topic.compared} messages"
     if topic.different:
         share = 100.0 * topic.different / topic.compared
-        line += f"{topic.different} differ ({share:.1f} %)"
+        line += f", {topic.different} differ ({share:.1f} %)"
         line += f", at most by {topic.largest:.6g} {topic.unit}".rstrip() if topic.largest else ""
     else:
-        line += "the same bit for bit" if topic.compared else "none on both sides"
+        line += ", the same bit for bit" if topic.compared else " both recorded and replayed"
     if topic.only_recorded or topic.only_replayed:
         line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
     if topic.alone is not None:
