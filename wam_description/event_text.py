@@ -140,7 +140,7 @@ SENTENCES: Final = {  # by cause
     "{model}",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
-    "command_stale": "command stale: {age_ms:b} ms old; allowed: {allowed_ms:g} ms; {cure}",
+    "command_stale": "command stale: {age_ms:b} ms old; allowed: below {allowed_ms:g} ms; {cure}",
     "node_late": "the {what} itself did not run for {time:.2f} s; allowed: {allowed:g} s; {cure}",
     "held_up": "the driver itself did not run for {time:.2f} s; allowed: {allowed:g} s; {step}: make the steps of "
     "that node faster, or run it in its own process",
@@ -170,6 +170,7 @@ REACH: Final = (
     "command a force that the arm can reach",
     f"the arm is pulled, or carries a load that is not in its model; {PARTS['resting'][1]}",
 )
+FAST: Final = ": the arm moved faster than the safety module allows; move it more slowly"
 CALM: Final = ("lower force_gain", "lower force_gain, or use joint sensors")
 
 
@@ -220,19 +221,19 @@ def news(status: NodeStatus, known: Collection[object]) -> str:
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     """What the placeholders of a sentence stand for that are no values."""
-    has_touched, is_motors = values.get("has_touched", 0.0) > 0.0, "motors" in str(values.get("source", ""))
+    source, detail = (str(values.get(name, "")) for name in ("source", "detail"))
+    has_touched, way = values.get("has_touched", 0.0) > 0.0, values.get("way", 0.0)
     push, ago = values.get("push"), values.get("ago", 0.0)
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
     is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
-    way, source = values.get("way", 0.0), values.get("source", "")
     found = {
         "travel": f"{abs(way):.3g} m {'against' if way < 0.0 else 'along'}",
         "since": SINCE[values.get("has_settled", 0.0) > 0.0],
         "reach": REACH[2 if is_pulled else has_touched],
-        "calm": CALM[is_motors],
+        "calm": CALM["motors" in source],
         "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,
-        "lamps": f" (the pendant shows a fault of the {values['detail']})" if values.get("detail") else "",
-        **dict(zip(("hidden", "dither"), HIDDEN.get(str(source), ("", "")), strict=True)),
+        "lamps": f" (the pendant shows a fault of the {detail}{FAST * ('velocity' in detail)})" if detail else "",
+        **dict(zip(("hidden", "dither"), HIDDEN.get(source, ("", "")), strict=True)),
         "model": LOADED * (values.get("part") == "payload") + "run 'wam identify'",
     }
     if values.get("part") in PARTS:

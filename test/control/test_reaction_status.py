@@ -44,7 +44,8 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
         (Event(Code.FAULT, Level.ERROR, {"reason": "the cable slipped"}), "the cable slipped"),
         (warning(Code.PUSHED, "pushed", force=24.6, **PUSH), "with at least 25 N; allowed: 20 N"),
         (warning(Code.PUSHED, "pushed", force=20.04, **PUSH), "with at least 20.04 N; allowed: 20 N"),
-        (fault("command_stale", age_ms=45.04, allowed_ms=45.0, cure=""), "45.04 ms old; allowed: 45 ms"),
+        (fault("command_stale", age_ms=45.04, allowed_ms=45.0, cure=""), "45.04 ms old; allowed: below 45 ms"),
+        (fault("bus_safety_idle", detail="velocity"), "the arm moved faster than the safety module allows"),
         (warning(Code.NOT_REACHED, "force_off", measured=-0.2, **OFF), "for 2 s; nothing is touched"),
         (
             warning(Code.NOT_REACHED, "force_off", measured=-5.6, **OFF),

@@ -64,7 +64,7 @@ class BusDriver(ArmDriver):
         self._tick += due
         self.health.counts["late periods"] += due - 1
         age = max((self.stamp - self._command_stamp) * 1e-9, time.perf_counter() - self._came)
-        if self.safety.mode is Mode.ENABLED and age > self._watchdog:
+        if self.safety.mode is Mode.ENABLED and age >= self._watchdog:
             cure = f"{due - 1} periods missed; check that velocity_loop runs"
             self.trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
         hardware.exchange(due)
