@@ -149,7 +149,7 @@ def two_frames_of_a_topic(path: Path) -> tuple[Made, dict[str, float]]:
 def steps_of_a_force(path: Path) -> tuple[Made, dict[str, float]]:
     """A force follows its command with 0.15 s, 3 % too low; it was commanded before the recording begins."""
     time, tau = times(20.0), 0.15
-    command = np.where(time < 5.0, 6.0, np.where(time < 12.0, 20.0, 35.0))
+    command = np.where(time < 5.0, 6.0, np.where(time < 12.0, 20.0, np.where(time < 16.0, 35.0, -10.0)))
     force = np.full((len(time), 3), [0.0, 0.0, 5.82])
     for i in range(1, len(time)):
         force[i, 2] = force[i - 1, 2] + (0.97 * command[i - 1] - force[i - 1, 2]) * (
@@ -159,7 +159,7 @@ def steps_of_a_force(path: Path) -> tuple[Made, dict[str, float]]:
     asked = wrenches("/controller/target_wrench", time[::5], np.column_stack([0 * command, 0 * command, command])[::5])
     name = "/ft wrench, 20 N at 5.0 s"
     planted = {f"{name}: rise time 10-90 %": math.log(9.0) * tau, f"{name}: force in the steady state": 19.4}
-    for at, steady in (("6 N at 0.0 s", 5.82), ("35 N at 12.0 s", 33.95)):
+    for at, steady in (("6 N at 0.0 s", 5.82), ("35 N at 12.0 s", 33.95), ("-10 N at 16.0 s", -9.7)):
         planted[f"/ft wrench, {at}: force in the steady state"] = steady
     planted |= {f"{name}: settling time to 5 %": math.log(20.0) * tau}
     planted = {k.replace("/ft wrench", "/ft/wrench"): v for k, v in planted.items()}

@@ -17,7 +17,7 @@ FORCE = ("force.x", "force.y", "force.z")
 
 
 class ForceStep(NamedTuple):
-    """A step of a command at a time, s, and its response, N along the change of the command."""
+    """A step of a command at a time, s, and its response, N, with the signs of the axis of the change."""
 
     label: str
     begin: float
@@ -51,7 +51,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     got = np.column_stack([measured.values[axis][known] for axis in axes])
     wanted = desired[rows]
     middle = wanted.mean(axis=0) if np.any(wanted != wanted[0]) else 0.0
-    sign = np.sign(float(np.sum(got * (wanted - middle)))) or 1.0
+    sign = np.sign(np.sum(got * (wanted - middle))) or 1.0
     found, arrives = [], command.arrives
     for last, row, until in zip([0.0 * desired[0], *desired[begins[:-1]]], begins, ends, strict=True):
         begin = max(float(command.time[row]), float(measured.time[0]))
@@ -61,6 +61,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
         if size <= HOLD.equal_force or arrives[row] or end - begin < HOLD.shortest:
             continue
         way = change / size
+        way *= np.sign(way[np.argmax(np.abs(way))])
         for piece in stretches:
             value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
             before = value[(piece.time < begin) & (piece.time >= begin - HOLD.before)]
@@ -106,7 +107,7 @@ def step_section(recording: AnalysedRecording) -> Section:
         settled += ", without a rise in the recording" * math.isnan(response.settling)
         sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
         findings += [
-            Finding(f"{name}: force in the steady state", "N", abs(response.final), abs(step.commanded)),
+            Finding(f"{name}: force in the steady state", "N", response.final, step.commanded),
             Finding(f"{name}: rise time 10-90 %", "s", response.rise),
             Finding(f"{name}: settling time to 5 %", "s", response.settling),
             Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
