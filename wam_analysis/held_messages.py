@@ -12,7 +12,8 @@ from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import JointColumns
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.recorded_run import RecordedRun, RecordedStep
+from wam_sim.reactions import StepSpan
+from wam_sim.recorded_run import RecordedRun
 
 
 def held_for(stamps: Times) -> int:
@@ -79,8 +80,8 @@ def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, Numbers] | None:
     return None
 
 
-def step_at(steps: Sequence[RecordedStep], stamp: int) -> str:
-    """Name of the step of a scenario at an instant, '' outside."""
+def step_at(steps: Sequence[StepSpan], stamp: int) -> str:
+    """Name of the step of a scenario, or of the force, at an instant, '' outside."""
     return next((step.name for step in steps if step.begin <= stamp < step.end), "")
 
 

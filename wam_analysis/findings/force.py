@@ -1,11 +1,13 @@
 """Sections about force: how it was reached and held, stability and limit cycles."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
+from wam_analysis.held_messages import step_at
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
@@ -38,7 +40,7 @@ def force_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"{NO_FORCE}.")
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
-    reactions = {one.hold.name: one.hold.reactions for one in held} | other
+    reactions = [*((one.hold.name, one.hold.reactions) for one in held), *other.items()]
     sentences += [WHOSE] * any(not one.hold.is_refused for one in held)
     findings += _dynamic_range(recording)
     wrong = _reaction_verdict(reactions, zero)
@@ -46,21 +48,22 @@ def force_section(recording: AnalysedRecording) -> Section:
 
 
 def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
-    """What was not simply obeyed besides constant forces, by step of the scenario, or of the run."""
-    spans = [(hold.begin, hold.end) for hold in recording.holds]
-    reactions = of_force_loop(recording.reactions)
-    rest = [one for one in reactions if not any(within([one], *span) for span in spans)]
-    steps: dict[str, tuple[RecordedReaction, ...]] = {}
+    """What was not simply obeyed besides constant forces, by step of the scenario, by force without one."""
+    reactions, holds = of_force_loop(recording.reactions), recording.holds
+    rest = [one for one in reactions if not any(within([one], hold.begin, hold.end) for hold in holds)]
+    steps = defaultdict[str, tuple[RecordedReaction, ...]](tuple)
     for step in recording.steps:  # several may have one name
-        steps[step.name] = (*steps.get(step.name, ()), *within(rest, step.begin, step.end))
-    return {name: found for name, found in (steps or {"force loop": tuple(rest)}).items() if found}
+        steps[step.name] += within(rest, step.begin, step.end)
+    for one in rest * (not recording.steps):
+        steps[step_at(holds, one.begin) or "force loop"] += (one,)
+    return {name: found for name, found in steps.items() if found}
 
 
-def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int) -> list[str]:
+def _reaction_verdict(found: Iterable[tuple[str, Sequence[RecordedReaction]]], zero: int) -> list[str]:
     """What was refused, and what was reported of others, in a sentence each."""
     doubtful = stated(IN_DOUBT)[:-1]
-    alike: dict[str, dict[tuple[str, Code], str]] = {what: {} for what in (NOT_APPLIED, doubtful, ELSE)}
-    for name, reactions in found.items():
+    alike = {what: dict[tuple[str, Code], str]() for what in (NOT_APPLIED, doubtful, ELSE)}
+    for name, reactions in found:
         for one in reactions:
             what = NOT_APPLIED if one.holds else doubtful if one.name is Code.REFUSED else ELSE
             event = "from" if what is doubtful else f"{one.name.words} at"
@@ -82,8 +85,7 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     if errors:
         whose = "" if all(len(one.true) for one in controlled) else "measured "
         text += f", largest {whose}error {apart(max(errors), HOLD.force_tolerance)} %"
-    touched = [one.hold.name for one in known if one.is_touching]
-    free = ", ".join(one.hold.name for one in known if one.hold.name not in touched)
+    free = ", ".join(one.hold.name for one in known if not one.is_touching)
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 
 
@@ -187,11 +189,11 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
-    margin = f"; predicted stable up to {shown(min(margins))} times these gains" if margins else ""
+    margin = f"; predicted stable up to {shown(min(margins))} times the gains at the start" if margins else ""
     if settled and not verdict and not wrong:
-        verdict.append(
-            f"Stability: {'all forces' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}."
-        )
+        whose = "controlled forces" if refused else "forces"
+        count = "all" if settled == len(held) else f"{settled} of {len(held)}"
+        verdict.append(f"Stability: {count} {whose} settled{margin}.")
     return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong)
 
 

@@ -193,7 +193,7 @@ class Guarded(NamedTuple):
         stable = "linearly stable with up to" if scale >= 1.0 else "NOT linearly stable with more than"
         return (
             f"Stability guard (sampled loop with its velocity loops, contact of {shown(self.surface)} N/m, "
-            f"{self.posture}): domain {domain}, {stable} {shown(scale)} times these gains."
+            f"{self.posture}): domain {domain}, {stable} {shown(scale)} times the gains at the start."
         )
 
 
