@@ -57,7 +57,8 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                     Finding(f"{name}: end", "s", end),
                     Finding(f"{name}: confidence", "", cycle.confidence),
                 ]
-    stated = sentences or ["Nothing in this recording repeats five times."]
+    which = "that was not commanded" if recording.commands else "in this recording"
+    stated = sentences or [f"Nothing {which} repeats five times."]
     return Section("stability", "Cycles", stated, findings, (), verdict)
 
 
