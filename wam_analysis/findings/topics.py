@@ -51,8 +51,7 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
             yield f"{name}: {', '.join(none)} without a value that is a number."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
-        sizes = np.sqrt((columns.force**2).sum(axis=1))
-        sizes = sizes[np.isfinite(sizes)]
+        sizes = np.sqrt(np.nansum(columns.force**2, axis=1))[np.isfinite(columns.force).any(axis=1)]
         what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
 

@@ -138,8 +138,8 @@ def _topics(
     """The joints and the wrench of some columns by quantity and name, at their times."""
     nothing = np.full(len(times), "", object)
 
-    def stacked(quantity: str, names: Iterable[str], absent: float) -> Numbers:
-        blank = np.full(len(known), absent)
+    def stacked(quantity: str, names: Iterable[str]) -> Numbers:
+        blank = np.full(len(known), np.nan)
         own = parts[quantity]
         return np.column_stack([own[n].numbers if n in own else blank for n in names])[known]
 
@@ -147,10 +147,10 @@ def _topics(
         mapped = [_split(given.fields[q])[0] for q in JOINT_FIELDS if q in given.fields]
         alone = given.joints[0] if len(given.joints) == 1 else next(iter(mapped), "")
         names = joint_names([name or alone for name in joints], 0)
-        p, v, e = (stacked(q, joints, np.nan) for q in JOINT_FIELDS)
+        p, v, e = (stacked(q, joints) for q in JOINT_FIELDS)
         yield "joints", JointColumns(times, times, nothing, names, p, v, e)
     if parts["force"] or parts["torque"]:
-        yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz", 0.0) for q in ("force", "torque")))
+        yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz") for q in ("force", "torque")))
 
 
 def _require_one_run(path: Path, times: Times) -> None:
