@@ -28,7 +28,7 @@ def files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
     if not path.exists():
-        raise BagError(f"{path} does not exist; give a bag directory or an .mcap file")
+        raise BagError(f"{path} does not exist; give the directory or the file of a recording")
     text, databases = _description(path), sorted(path.glob("*.db3"))
     if any(path.glob("*.zstd")) or _EACH_MESSAGE.search(text) or (databases and text):
         return [path]
