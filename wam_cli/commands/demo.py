@@ -82,7 +82,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = base.with_nodes("scenario", "recorder").with_values({"recorder:name": name})
     Interface(configuration.shared)  # refused before anything is printed, as are the values
     require_parameters(configuration)
-    steps = report_task(configuration, bag, task.name if task else "")
+    steps = report_task(configuration, task.name if task else "")
     failures, stopped = play(configuration, steps, bag, given)
     if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
@@ -101,7 +101,7 @@ def run(given: argparse.Namespace) -> int:
     return exit_code_of(unmet)
 
 
-def report_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:
+def report_task(configuration: Configuration, task: str = "") -> list[ScenarioStep]:
     """Print what is about to happen, and refuse a task that cannot be played before anything is started.
 
     Returns
@@ -128,7 +128,7 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     if presses:
         who = "the force loop presses with" if "force_loop" in configuration.shared.nodes else "commanded forces:"
         print(f"  {who} {', '.join(f'{newtons:g}' for newtons in presses)} N")
-    print(f"  every topic will be recorded in {bag}", flush=True)
+    sys.stdout.flush()
     return list(steps)
 
 
