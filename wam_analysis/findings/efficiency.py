@@ -19,10 +19,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
     """Efficiency of the transmission, where its losses are larger than the work that it stores."""
     if (signals := recording.friction.with_losses) is None:
         return None
-    arm = signals.arm
-    inertia, speed = np.array(arm.motors.inertia), signals.velocity
-    acceleration = np.gradient(speed, signals.time, axis=0)
-    motor = np.sum((signals.torque - inertia * acceleration) * speed, axis=1)
+    motor = np.sum((signals.torque - signals.rotors) * signals.velocity, axis=1)
     at_links = signals.strain if np.any(np.isfinite(signals.strain)) else signals.cable_torque
     joint = np.sum(at_links * signals.joint_velocity, axis=1)
     known = np.isfinite(joint) & np.isfinite(motor)
@@ -47,7 +44,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
         if is_measured and back.put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * back.ratio, note="backdriven"))
             sentences.append(f"While the links moved the motors, they put {shown(back.put, 'J')} into it.")
-    findings += _backdrive(arm, recording.friction)
+    findings += _backdrive(signals.arm, recording.friction)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
     shows = [stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%"]

@@ -58,6 +58,11 @@ class TransmissionSignals(NamedTuple):
     strain: Numbers
     caveats: tuple[str, ...]
 
+    @property
+    def rotors(self) -> Numbers:
+        """Torque that accelerates the rotors, (k, n), N m."""
+        return np.array(self.arm.motors.inertia) * np.gradient(self.velocity, self.time, axis=0)
+
 
 def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | None:
     """The signals of a recording; None if it has no motor states or no load."""
@@ -196,8 +201,7 @@ def _hidden(signals: TransmissionSignals) -> str:
 
     Motors modelled as velocity sources have a huge inertia: friction would be the difference of two huge torques.
     """
-    accelerates = np.abs(np.array(signals.arm.motors.inertia) * np.gradient(signals.velocity, signals.time, axis=0))
-    rotors, cables = float(np.max(accelerates)), float(np.max(np.abs(signals.load)))
+    rotors, cables = (float(np.max(np.abs(torque))) for torque in (signals.rotors, signals.load))
     if rotors <= SHAFT.hidden * cables:
         return ""
     return (
@@ -248,13 +252,13 @@ def _waves(signals: TransmissionSignals, motor: int, shaft: str, parameters: Pre
 def _unrecorded(signals: TransmissionSignals, motor: int) -> Numbers:
     """What a motor's load may differ by from the recorded one, (k, 2), N m: within a period, and between its samples.
 
-    It is that of an instant within half a period of the middle of one. A straight line is off a curve by a twelfth of
-    the curvature times the squared interval, in the mean.
+    It is that of an instant within half a period of the middle of one. Between its samples, the motor's torque less
+    that of its rotor shows what a straight line misses: cables swing in time with commands that are as far apart.
     """
-    period = float(np.median(np.diff(signals.time)))
-    interval = period / max(float(np.mean(signals.sampled)), period)
-    rate = np.gradient(signals.load[:, motor], signals.time)
-    return np.column_stack([0.5 * period * rate, interval**2 / 12.0 * np.gradient(rate, signals.time)])
+    time, rows = signals.time, np.unique([0, *np.flatnonzero(signals.sampled)])
+    passed = (signals.torque - signals.rotors)[:, motor]
+    late = 0.5 * np.median(np.diff(time)) * np.gradient(signals.load[:, motor], time)
+    return np.column_stack([late, passed - np.interp(time, time[rows], passed[rows])])
 
 
 def _friction_of_joints(signals: TransmissionSignals) -> dict[str, Friction]:
