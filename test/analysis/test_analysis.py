@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from arms import WAM
 from browser import looked_at
 from rosbags.rosbag2 import StoragePlugin, Writer
 from sample_messages import STORE, joint_state
@@ -21,6 +22,7 @@ from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.page import page
 from wam_analysis.findings.prediction import PressedPoint, guarded, largest_force, node_at
 from wam_analysis.findings.text import SCHEMA, json_text, text
+from wam_analysis.findings.transmission import CABLE, TransmissionSignals, _unrecorded
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
 from wam_bag.bag import Bag, JointColumns, TableColumns, WrenchColumns
@@ -155,6 +157,17 @@ def test_what_was_changed_while_the_arm_ran_is_named(moving: Recorded) -> None:
     assert f"Changed while it ran: force_loop:force_gain from {gain} to [0.001] at 2.9" in text
     assert text.count("Changed") == 1
     assert "Predictions are for the values at the start." in text
+
+
+def test_motors_show_what_their_load_swings_by_between_its_samples() -> None:
+    """Without it, a controller that acts as often as the load is recorded makes viscous friction of it."""
+    time, nothing, swing = np.arange(0.0, 1.0, 1e-3), np.zeros((1000, 4)), np.tile([0.0, 1.0, 2.0, 2.0, 1.0], 200)
+    velocity, sampled = np.sin(time)[:, np.newaxis] + nothing, swing == 0.0
+    signals = TransmissionSignals(
+        WAM, time, nothing, velocity, nothing, nothing, CABLE, sampled, sampled, nothing, nothing, nothing, ()
+    )
+    moved = signals._replace(torque=signals.rotors + swing[:, np.newaxis])
+    assert _unrecorded(moved, 0)[:, 1] == pytest.approx(swing)
 
 
 def test_a_push_is_in_no_friction_where_only_gravity_is_known(moving: Recorded) -> None:
