@@ -122,9 +122,11 @@ def _press_sentence(one: HeldForce) -> str:
         return f"{text}; the resulting force was not recorded."
     remarks = [text]
     if response is not None and math.isfinite(response.rise):
-        remarks += [f"{why}, so rise time and overshoot are not evaluated" for why in [_impact(one)] if why]
+        if why := _impact(one):
+            remarks.append(f"{why}, so rise time and overshoot are not evaluated")
         remarks += ["it did not settle to 5 %"] * math.isinf(response.settling)
-    return "; ".join([*remarks, *["the arm was pushed meanwhile"] * one.is_pushed]) + "."
+    remarks += ["the arm was pushed meanwhile"] * one.is_pushed
+    return f"{'; '.join(remarks)}."
 
 
 def _impact(one: HeldForce) -> str:
@@ -180,12 +182,12 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     for one in held:
         theory = recording.theories[one.hold.name]
         text, fate = _fate(one)
-        found = [text, *([theory.guarded.sentence] if theory.guarded is not None else [])]
+        found = [text, *(guard.sentence for guard in [theory.guarded] if guard)]
         sentences += [sentence for sentence in found if sentence not in sentences]
         if fate is not Verdict.SETTLED:
             (wrong if fate is Verdict.DIVERGED else verdict).append(text)
         findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory)]
-    if not held and not refused:
+    if not recording.held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
