@@ -97,6 +97,11 @@ def of_force_loop(reactions: Iterable[RecordedReaction]) -> list[RecordedReactio
     return [one for one in reactions if one.name is not Code.FAULT]
 
 
+def duration(reactions: Iterable[RecordedReaction]) -> float:
+    """How long reactions last in all, s."""
+    return sum(one.end - one.begin for one in reactions) / 1e9
+
+
 def steady_begin(step: StepSpan) -> int:
     """When what is taken as the steady state of a step begins, ns."""
     return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
@@ -200,17 +205,18 @@ def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[StepS
 
 
 def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:
-    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how often and why.
+    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how long and why.
 
     Time and reason are those of the longest.
     """
     lines = []
     for kind in dict.fromkeys(one.name for one in reactions):
         alike = [one for one in reactions if one.name is kind]
-        longest, others = max(alike, key=lambda one: one.end - one.begin), len(alike) - 1
+        longest = max(alike, key=lambda one: one.end - one.begin)
+        others = duration(alike) - duration([longest])
         verb = REFUSAL if longest.holds else IN_DOUBT if kind is Code.REFUSED else "reported"
         verb += f" ({kind.words})" * (kind is not Code.REFUSED)
-        again = "" if not others else " and once more" if others == 1 else f" and {others} more times"
+        again = f", and for {others:.2f} s at other times" * (len(alike) > 1)
         begin, end = ((stamp - zero) / 1e9 for stamp in (longest.begin, longest.end))
         lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {longest.reason}")
     return lines

@@ -167,5 +167,5 @@ def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
     assert len(within([late], 0, 1_000_000_000)) == 1
     lasting = RecordedReaction(2_000_000_000, 4_000_000_000, Event(Code.NOT_REACHED, values={"reason": "so"}))
     assert sentences("press", [late, lasting], 0) == [
-        "press: reported (not reached) from 2.00 to 4.00 s and once more: so"
+        "press: reported (not reached) from 2.00 to 4.00 s, and for 1.00 s at other times: so"
     ]

@@ -15,7 +15,7 @@ from wam_control.force.thresholds import GUARD
 from wam_description.event import Code
 from wam_description.number_text import apart
 from wam_description.signals import BASE
-from wam_sim.reactions import IN_DOUBT, STEADY, RecordedReaction, of_force_loop, within
+from wam_sim.reactions import IN_DOUBT, STEADY, RecordedReaction, duration, of_force_loop, within
 from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
@@ -62,14 +62,22 @@ def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedRe
 def _reaction_verdict(found: Iterable[tuple[str, Sequence[RecordedReaction]]], zero: int) -> list[str]:
     """What was refused, and what was reported of others, in a sentence each."""
     doubtful = stated(IN_DOUBT)[:-1]
-    alike = {what: dict[tuple[str, Code], str]() for what in (NOT_APPLIED, doubtful, ELSE)}
+    alike = {
+        what: defaultdict[tuple[str, Code], list[RecordedReaction]](list) for what in (NOT_APPLIED, doubtful, ELSE)
+    }
     for name, reactions in found:
         for one in reactions:
             what = NOT_APPLIED if one.holds else doubtful if one.name is Code.REFUSED else ELSE
-            event = "from" if what is doubtful else f"{one.name.words} at"
-            lasting = f", for {(one.end - one.begin) / 1e9:.2f} s" * (what is NOT_APPLIED)
-            alike[what].setdefault((name, one.name), f"{name} ({event} {(one.begin - zero) / 1e9:.2f} s{lasting})")
-    return [f"{what}: {'; '.join(named.values())}." for what, named in alike.items() if named]
+            alike[what][name, one.name].append(one)
+    lines = []
+    for what, named in alike.items():
+        each = []
+        for (name, code), ones in named.items():
+            event = "from" if what is doubtful else f"{code.words} at"
+            lasting = f", for {duration(ones):.2f} s{' in all' * (len(ones) > 1)}" * (what is NOT_APPLIED)
+            each.append(f"{name} ({event} {(ones[0].begin - zero) / 1e9:.2f} s{lasting})")
+        lines += [f"{what}: {'; '.join(each)}."] * bool(each)
+    return lines
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
