@@ -196,7 +196,7 @@ class Health:
 
         Parameters
         ----------
-        is_reported : whether the status has it anyway, or leaves it to the others that are late as well; one a second
+        is_reported : whether the status leaves it to the others that are late as well; one a second
             is logged.
         stamp : of a message that may be refused again, ns; it counts once.
         """

@@ -167,7 +167,7 @@ class AdaptedNode(StackNode):
         refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
         for topic, why in refusals.items():
             reason = why if isinstance(why, str) else sentence(why)
-            self.health.refuse(topic, reason, is_reported=True, stamp=inputs.stamp_of(topic))
+            self.health.refuse(topic, reason, stamp=inputs.stamp_of(topic))
 
     def _publish(self, stamp: int, outputs: Outputs) -> None:
         for topic, value in outputs.items():

@@ -49,6 +49,17 @@ def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Configuration
     return playing(STEPS, tmp_path, configuration=EXAMPLES / "impedance.yaml")
 
 
+@pytest.mark.usefixtures("configured")
+def test_the_status_of_an_own_controller_has_what_it_refuses(arm: RunningArm) -> None:
+    arm.start(configuration=EXAMPLES / "impedance.yaml")
+    arm.send("joint_posture_command", position=[-9.0, 0.0, 0.0, 0.0], seconds=0.3)
+    assert "impedance: " in arm.run_until_refused("joint_posture_command")
+    arm.run(0.1)
+    status = arm.status("impedance")
+    assert status is not None
+    assert (status.level, status.facts["refused"]) == (Level.WARN, "joint_posture_command"), status.message
+
+
 def test_an_own_controller_is_the_same_in_simulation_topics_and_replay(
     configured: Configuration, tmp_path: Path, arm: RunningArm
 ) -> None:
