@@ -15,7 +15,6 @@ from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-NO_NOISE = np.zeros(0)
 INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of an inertia
 
 
@@ -75,7 +74,8 @@ class GaugeEffects:
         effects.ravel()[:: 4 * n + 2] = motion.model  # the diagonal
         effects[:, n:] = self._links.of(motion.pose, self._still, self._still)
         residual = motion.residual - self._payload * effects[:, -1]
-        return Observation(residual, effects, self._rest, NO_NOISE, motion.pose, self._lasting)
+        moving = motion.signals  # there are none
+        return Observation(residual, effects, self._rest, moving, motion.pose, self._lasting)
 
 
 class ErrorEffects:
