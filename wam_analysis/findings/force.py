@@ -150,7 +150,7 @@ def _impact(one: HeldForce) -> str:
 def press_findings(one: HeldForce) -> list[Finding]:
     """A commanded force in numbers: how it was held, and how it was reached."""
     name, response = one.hold.name, one.response
-    seconds = sum(reaction.end - reaction.begin for reaction in one.hold.reactions if reaction.holds) / 1e9
+    seconds = duration(reaction for reaction in one.hold.reactions if reaction.holds)
     found = [Finding(f"{name}: commanded force", "N", one.hold.commanded)]
     found += [Finding(f"{name}: refused for", "s", seconds)] if seconds else []
     if one.hold.is_refused:
