@@ -40,12 +40,13 @@ def compiled_steps(
     try:
         built: Any = importlib.import_module("wam_driver.fast_steps")
         library = ctypes.CDLL(f"libmujoco.so.{mujoco.__version__}")  # which mujoco has loaded already
-        functions = [library[name] for name in ("mj_step1", "mj_step2", "mj_applyFT", "_mjPRIVATE_setTlsLogHandler")]
+        names = ("mj_step1", "mj_step2", "mj_applyFT", "_mjPRIVATE_setTlsLogHandler", "mjcb_time")
+        found = [library[name] for name in names]
     except (ImportError, OSError, AttributeError):
         return None
     if mujoco.mj_version() != built.MUJOCO:
         return None
-    addresses = [ctypes.cast(function, ctypes.c_void_p).value for function in functions]
+    addresses = [ctypes.cast(one, ctypes.c_void_p).value for one in found]
     each = circuits.each if circuits.depends_on_torque else []
     lists = (laws, *friction.bounds, friction.direction, each)
     constants = (step, PLANT.smallest_depth, float(PLANT.sharpness))

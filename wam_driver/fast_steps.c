@@ -20,6 +20,7 @@ typedef struct {
   Step first, second;
   Apply apply;
   SetHandler set;
+  mjfTime *clock;  /* of MuJoCo's own timers, which nobody reads and which take long */
   PyObject *given;  /* the tuple of all that follow, which keeps them alive */
   PyObject *error, *laws, *low, *high, *direction, *each, *circuits, *pushes;
   double step, smallest, sharpness;
@@ -166,23 +167,24 @@ static void forget(PyObject *capsule) {
 }
 
 PyDoc_STRVAR(prepare_doc,
-             "prepare(model, data, step1, step2, apply, set, error, laws, low, high, direction, each, circuits, pushes, step,\n"
-             "        smallest, sharpness)\n\n"
-             "What `advance` takes: addresses of model, data, mj_step1, mj_step2, mj_applyFT and of what sets a handler of\n"
-             "messages; the class of the exception; `laws` of Surfaces; `bounds` and `direction` of DryFriction; `each` of\n"
-             "CableCircuits, empty where nothing follows the torque, and themselves; `pushes` of CoverLoads; the step of the\n"
-             "plant, s, and two constants of Surfaces.  All lists are read at every step.");
+             "prepare(model, data, step1, step2, apply, set, clock, error, laws, low, high, direction, each, circuits,\n"
+             "        pushes, step, smallest, sharpness)\n\n"
+             "What `advance` takes: addresses of model, data, mj_step1, mj_step2, mj_applyFT, of what sets a handler of\n"
+             "messages, and of mjcb_time; the class of the exception; `laws` of Surfaces; `bounds` and `direction` of\n"
+             "DryFriction; `each` of CableCircuits, empty where nothing follows the torque, and themselves; `pushes` of\n"
+             "CoverLoads; the step of the plant, s, and two constants of Surfaces.  All lists are read at every step.");
 
 static PyObject *prepare(PyObject *Py_UNUSED(self), PyObject *args) {
-  Py_ssize_t model, data, first, second, apply, set;
+  Py_ssize_t model, data, first, second, apply, set, clock;
   Plant given;
-  if (!PyArg_ParseTuple(args, "nnnnnnOO!O!O!O!O!OO!ddd", &model, &data, &first, &second, &apply, &set, &given.error,
-                        &PyList_Type, &given.laws, &PyList_Type, &given.low, &PyList_Type, &given.high, &PyList_Type,
-                        &given.direction, &PyList_Type, &given.each, &given.circuits, &PyDict_Type, &given.pushes,
+  if (!PyArg_ParseTuple(args, "nnnnnnnOO!O!O!O!O!OO!ddd", &model, &data, &first, &second, &apply, &set, &clock,
+                        &given.error, &PyList_Type, &given.laws, &PyList_Type, &given.low, &PyList_Type, &given.high,
+                        &PyList_Type, &given.direction, &PyList_Type, &given.each, &given.circuits, &PyDict_Type, &given.pushes,
                         &given.step, &given.smallest, &given.sharpness))
     return NULL;
   given.given = args, given.model = (const mjModel *)model, given.data = (mjData *)data;
   given.first = (Step)first, given.second = (Step)second, given.apply = (Apply)apply, given.set = (SetHandler)set;
+  given.clock = (mjfTime *)clock;
   const Py_ssize_t shafts = PyList_GET_SIZE(given.low);
   if (PyList_GET_SIZE(given.high) != shafts || PyList_GET_SIZE(given.direction) != shafts ||
       PyList_GET_SIZE(given.each) > shafts || given.model->nv < shafts) {
@@ -222,6 +224,8 @@ static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ss
   PyObject *velocity = PyList_New(shafts);
   if (!velocity) return NULL;
   for (Py_ssize_t i = 0; i < shafts; i++) PyList_SET_ITEM(velocity, i, PyFloat_FromDouble(0.0));
+  const mjfTime clock = *plant->clock;
+  *plant->clock = NULL;
   for (long k = 0; k < count; k++) {
     if (k == count - 1)
       for (Py_ssize_t i = 0; i < shafts; i++) PyList_SetItem(velocity, i, PyFloat_FromDouble(data->qvel[i]));
@@ -235,8 +239,10 @@ static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ss
     if (PyDict_GET_SIZE(plant->pushes)) memset(data->qfrc_applied, 0, plant->model->nv * sizeof(mjtNum));
     if (PyList_GET_SIZE(plant->each) && follow(plant, &slack)) goto failed;
   }
+  *plant->clock = clock;
   return velocity;
 failed:
+  *plant->clock = clock;
   Py_DECREF(velocity);
   return NULL;
 }
