@@ -228,17 +228,17 @@ def _own_line(recording: AnalysedRecording) -> str:
 
 
 def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
-    """The live parameters that were changed while the arm ran, each to its first other value; zero is in ns."""
-    found: dict[str, str] = {}
+    """The changes of live parameters while the arm ran; zero is in ns."""
+    newest, named = dict[str, Any](), list[str]()
     for stamp, values in run.live_values(*run.parameters.nodes):
         for key, value in values.items():
             node, _, name = key.partition(":")
-            before = run.parameters.nodes.get(node, {}).get(name)
+            before = newest.get(key, run.parameters.nodes.get(node, {}).get(name))
             if before not in (None, value):
                 text = f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s"
-                found.setdefault(key, text + _lowered(run, node, name, stamp))
-    if found:
-        named = list(found.values())
+                named.append(text + _lowered(run, node, name, stamp))
+            newest[key] = value
+    if named:
         more = f" and {len(named) - LAYOUT.changes} more" * (len(named) > LAYOUT.changes)
         yield (
             f"Changed while it ran: {', '.join(named[: LAYOUT.changes])}{more}. "

@@ -43,7 +43,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
             sentences.append(f"While driving, the motors put {shown(forward.put, 'J')} into the transmission.")
         if is_measured and back.put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * back.ratio, note="backdriven"))
-            sentences.append(f"While the links moved the motors, they put {shown(back.put, 'J')} into it.")
+            sentences.append(f"The links put {shown(back.put, 'J')} into it while they moved the motors.")
     findings += _backdrive(signals.arm, recording.friction)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")

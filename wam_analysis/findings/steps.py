@@ -207,9 +207,8 @@ def _false_verdict(traces: Traces) -> VerdictAnswer:
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which is normal when a contact ends"
         return VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)
-    return VerdictAnswer(
-        question, _yes(part <= TOUCH.false_tolerance), f"{apart(part, TOUCH.false_tolerance)} % of the time without one"
-    )
+    remark = f"{apart(part, TOUCH.false_tolerance)} % of the time without contact"
+    return VerdictAnswer(question, _yes(part <= TOUCH.false_tolerance), remark)
 
 
 def _answer(question: str, values: Sequence[float], allowed: float, shown: str) -> VerdictAnswer:

@@ -34,7 +34,7 @@ def sent(shared: Shared, own: BusParameters, version: int) -> Iterator[str]:
 
     def overhear(frame: Frame) -> list[Frame]:
         if frame.sender == HOST:
-            parts["each period, torques only where the arm is enabled" if arm.is_running else arm.advice].append(frame)
+            parts["each period, torques only while the arm is enabled" if arm.is_running else arm.advice].append(frame)
         return [frame]
 
     bus.on_line = overhear
