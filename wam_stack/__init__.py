@@ -90,13 +90,13 @@ def simulate(
     return run
 
 
-def analyse(recording: str | Path | Bag | Mapping[str, Any] | Simulation) -> Analysis:
+def analyse(recording: str | Path | Bag | Mapping[str, Any] | np.ndarray | Simulation) -> Analysis:
     """Analyse a recording of this stack or of another robot.
 
     Parameters
     ----------
-    recording : a bag, also as `read` returns it; a CSV file; a table such as a DataFrame; or a simulation, which is
-        played again and recorded.
+    recording : a bag, also as `read` returns it; a CSV file; a table, which is a DataFrame, a dict of arrays or a
+        structured array; or a simulation, which is played again and recorded.
 
     Raises
     ------

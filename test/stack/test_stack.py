@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wam_stack
+from wam_bag.bag import BagError
 from wam_control.task.scenario import ScenarioStep
 from wam_description.parameters import ParameterError
 
@@ -31,10 +33,7 @@ def test_a_scenario_is_played_and_analysed() -> None:
 
 
 def test_what_cannot_be_played_is_an_error_with_its_reason() -> None:
-    steps = [
-        ScenarioStep("release", 0.1, request="enable"),
-        ScenarioStep("turn", 1.0, posture=(0.0, 0.0, 0.0, 1.0)),
-    ]
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("turn", 1.0, posture=(0.0, 0.0, 0.0, 1.0))]
     with pytest.raises(RuntimeError, match="above its limit"):
         wam_stack.simulate(wam_stack.load(values={"driver:cover_speed_limit": 0.01}), steps)
 
@@ -43,6 +42,11 @@ def test_a_recording_is_read_and_analysed() -> None:
     bag = SAMPLES / "wam-touch"
     assert len(wam_stack.read(bag).topics["/wam/motor_states"].stamp_ns)
     assert repr(wam_stack.analyse(bag)) == repr(wam_stack.analyse(wam_stack.read(bag, ["motor_states"])))
+    table = {"time": np.arange(0.0, 5.0, 0.01), "position.elbow": np.sin(np.arange(0.0, 5.0, 0.01))}
+    fields = np.rec.fromarrays(list(table.values()), names=list(table))
+    assert repr(wam_stack.analyse(table)) == repr(wam_stack.analyse(fields))
+    with pytest.raises(BagError, match="ndarray is no table"):
+        wam_stack.analyse(np.zeros((5, 2)))
 
 
 def test_the_guard_reports_its_margin_and_the_arm_its_jacobian() -> None:

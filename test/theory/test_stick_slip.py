@@ -10,16 +10,7 @@ import pytest
 
 from wam_theory.friction_verdict import stiction_cycle
 from wam_theory.stability_map import largest_stable_steps
-from wam_theory.stick_slip import (
-    FrictionNode,
-    IntegralLoop,
-    Kind,
-    Motion,
-    Trajectory,
-    Verdict,
-    assess,
-    simulate,
-)
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, Motion, Trajectory, Verdict, assess, simulate
 
 # the testbed of 5.6 on the joint side, b for zeta = 0.05; lb-in and rad
 TESTBED = (4.0, 2.0 * 0.05 * math.sqrt(4.0 * (14443.0 + 12960.0)), 14443.0, 12960.0)

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.efficiency import efficiency_section
 from wam_analysis.findings.effort import effort_section
@@ -79,7 +81,10 @@ class Analysis(NamedTuple):
 
 
 def analyse(
-    source: str | Path | Mapping[str, Any], progress: Progress, given: TopicMap = NOTHING_GIVEN, namespace: str = ""
+    source: str | Path | Mapping[str, Any] | np.ndarray,
+    progress: Progress,
+    given: TopicMap = NOTHING_GIVEN,
+    namespace: str = "",
 ) -> Analysis:
     """Read a bag and analyse it.
 

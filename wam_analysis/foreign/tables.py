@@ -64,9 +64,13 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
 
 
 def series_of_frame(table: Any) -> Mapping[str, Any]:
-    """Columns of a DataFrame with its index, the time if that is of dates without a name, or a map as it is."""
-    if not hasattr(table, "reset_index"):
+    """Columns of a DataFrame with its index, the time if that is of dates without a name, of a map, or named fields."""
+    if isinstance(table, np.ndarray) and table.dtype.names:
+        return {name: table[name] for name in table.dtype.names}
+    if isinstance(table, Mapping):
         return table
+    if not hasattr(table, "reset_index"):
+        raise BagError(f"{type(table).__name__} is no table; give columns by title: a DataFrame, or a dict of arrays")
     is_time = table.index.name is None and table.index.dtype.kind in "mM" and "time" not in table
     return (table.rename_axis("time") if is_time else table).reset_index()
 
