@@ -427,7 +427,7 @@ def test_the_command_writes_text_json_and_page(
     (tmp_path / "t.csv").write_text("t,q1\n0.0,1.0\n")
     for name, said, *more in (
         ("nothing", "does not exist"), ("no.csv", "No such file"), ("t.csv", "has no column 'time'"),
-        ("t.csv", "'x' is neither a number nor one of", "--unit", "position=x"),
+        ("t.csv", "'x' is no unit of position; give", "--unit", "position=x"),
     ):  # fmt: skip
         with pytest.raises(SystemExit) as ended:
             main(["analyse", str(tmp_path / name), *more])

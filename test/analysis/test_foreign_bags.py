@@ -563,9 +563,12 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
     ("options", "message"),
     [
         (([], [], [], ["speed=v"], []), "--map is 'speed=v'"),
-        (([], [], [], [], ["effort=lbf"]), "'lbf' is neither a number nor one of rad"),
+        (
+            ([], [], [], [], ["effort=lbf"]),
+            "'lbf' is no unit of effort; give --unit effort= and a factor or one of N, mN",
+        ),
         (([], [], [], [], ["name=s"]), "--unit is 'name=s'"),
-        (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; it may be a factor or N, "),
+        (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; give"),
         (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),
     ],
 )

@@ -442,7 +442,7 @@ def other_units() -> list[Case]:
     return [
         Case("position alone", by_rosbags, alone, {}, "", NOTHING, (in_degrees,)),
         scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),
-        scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "rpm (shown in rad/s", "mm/s (shown in m/s"),
+        scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "mm/s (shown in m/s", "rpm (shown in rad/s"),
         scaled("effort", 1e3, by_rosbags, "", "mN (shown in N", "mNm (shown in N m", "mA (shown in A"),
     ]
 

@@ -9,11 +9,14 @@ QUANTITIES = {  # units that are shown, that of ROS first
     "torque": ("N m",), "stamp": ("s",),
 }  # fmt: skip
 MAPPED = (*QUANTITIES, "name")
+WAYS = {
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "turn": math.tau, "rev": math.tau},
+    "m": {"m": 1.0, "mm": 1e-3},
+}
 UNITS = {  # as given: factor, unit that is shown
-    "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "°": (math.pi / 180.0, "rad"), "turn": (2.0 * math.pi, "rad"),
-    "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180.0, "rad/s"), "°/s": (math.pi / 180.0, "rad/s"),
+    **{name: (factor, unit) for unit, names in WAYS.items() for name, factor in names.items()},
+    **{f"{name}/s": (factor, f"{unit}/s") for unit, names in WAYS.items() for name, factor in names.items()},
     "rpm": (math.pi / 30.0, "rad/s"),
-    "m": (1.0, "m"), "mm": (1e-3, "m"), "m/s": (1.0, "m/s"), "mm/s": (1e-3, "m/s"),
     "N": (1.0, "N"), "mN": (1e-3, "N"), "kN": (1e3, "N"),
     "Nm": (1.0, "N m"), "N m": (1.0, "N m"), "mNm": (1e-3, "N m"), "mN m": (1e-3, "N m"),
     "A": (1.0, "A"), "mA": (1e-3, "A"),
@@ -90,15 +93,13 @@ def _values(option: str, what: str, allowed: Collection[str], texts: Sequence[st
 
 def unit_of(quantity: str, text: str) -> tuple[float, str]:
     """Factor and shown unit of a unit, or of a factor, as it is written; raises ValueError with what is allowed."""
-    if text in UNITS:
-        if UNITS[text][1] not in QUANTITIES[quantity]:
-            fitting = ", ".join(name for name, (_, unit) in UNITS.items() if unit in QUANTITIES[quantity])
-            raise ValueError(f"--unit {quantity}: '{text}' is no unit of {quantity}; it may be a factor or {fitting}")
+    if text in UNITS and UNITS[text][1] in QUANTITIES[quantity]:
         return UNITS[text]
     try:
         factor = float(text)
     except ValueError:
         factor = 0.0
     if factor == 0.0 or not math.isfinite(factor):
-        raise ValueError(f"--unit {quantity}: '{text}' is neither a number nor one of {', '.join(UNITS)}")
+        fitting = ", ".join(name for name, (_, unit) in UNITS.items() if unit in QUANTITIES[quantity])
+        raise ValueError(f"'{text}' is no unit of {quantity}; give --unit {quantity}= and a factor or one of {fitting}")
     return factor, QUANTITIES[quantity][0]
