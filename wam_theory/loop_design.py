@@ -52,7 +52,7 @@ class LoopDesign(NamedTuple):
             f"margin: the gain is {part:.3g} times the largest linearly stable one, {verdict.margin:.4g}",
             f"largest safe error: {verdict.stable_error:.4g}; saturation of the loop: {self.loop.error_limit:.4g}",
             *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
-            f"in figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
+            f"in figure 5.8, not sampled: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
             ASSUMED,
         ]
         if undecided > verdict.stable_error:
@@ -61,7 +61,7 @@ class LoopDesign(NamedTuple):
                 f"some were not followed to their end ({DESIGN.patient_events} events)"
             )
         if verdict.saturated_cycle:
-            lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g}")
+            lines.append(f"near the margin, a large step may end in another limit cycle: {verdict.saturated_cycle:.3g}")
         lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the margin"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)

@@ -108,7 +108,7 @@ def _numbers(name: str, contact: ListedContact, period: float, declared: float) 
     yield Finding(f"{name}: declared position", "cm", cm * declared)
     least = "lower bound: the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
-    yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
+    yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error, note="of the medians")
     unknown = "not known: the force may be a lower bound" * (not one.is_placed)
     yield Finding(f"{name}: error of the force's magnitude", "N", contact.force_error, note=least or unknown)
     is_early = contact.latency <= 0.0
@@ -130,4 +130,4 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
 def _errors(away: float, off: float) -> str:
     known = [f"position {shown(away, 'cm')}"] * math.isfinite(away)
     known += [f"force vector {shown(off, 'N')}"] * math.isfinite(off)
-    return f"; median error: {', '.join(known)}" * bool(known)
+    return f"; median error of all samples: {', '.join(known)}" * bool(known)

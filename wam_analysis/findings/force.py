@@ -198,8 +198,8 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     if not recording.held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
-    margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
-    margin = f"; predicted stable up to {shown(min(margins))} times the gains at the start" if margins else ""
+    margins = [(one.guarded.assessment.scale, one.guarded.margin) for one in recording.theories.values() if one.guarded]
+    margin = f"; predicted stable up to {min(margins)[1]} times the gains at the start" if margins else ""
     if settled and not verdict and not wrong:
         whose = "controlled forces" if refused else "forces"
         count = "all" if settled == len(held) else f"{settled} of {len(held)}"

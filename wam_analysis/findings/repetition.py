@@ -47,7 +47,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 frequency = 1.0 / cycle.period
                 if found.origin not in (COMMANDED_CYCLE, HARMONIC):
                     size = f"{shown(frequency, 'Hz')}, {shown(cycle.peak_to_peak, unit)} peak to peak"
-                    verdict.append(f"{label} repeats at {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
+                    verdict.append(f"{name} repeats at {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
                 findings += [
                     Finding(
                         f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=found.origin, error=found.error

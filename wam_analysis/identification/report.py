@@ -19,7 +19,8 @@ BY_SHAPE = "by the curve"
 NOTES = f"""'In combination': identified only together with other parameters.
 '{BY_SHAPE}': static friction is the value of the fitted friction curve at rest, with the error of that curve. Stiction
 that acts only below {IDENTIFY.slowest_motor:g} rad/s of a motor is not in it; `wam analyse` shows breakaway torques.
-The inertia of a rotor may be wrong by a quarter, up to two of its standard errors: see docs/identify.md.
+The inertia of a rotor may be wrong by a quarter of it, which is within two of its standard errors: see
+docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: it gives the same torques as friction that differs between the
 directions, in motion, at rest and with a dither. The table shows the offset that would explain the whole difference.

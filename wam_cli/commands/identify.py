@@ -151,7 +151,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     command = f"wam identify --excite {shlex.quote(str(given.excite))} --seed {seed} --seconds {seconds:g}"
     given.excite.write_text(f"{HEADING}: {command}\n{text}", encoding="utf-8")
     still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
-    on_arm = f"wam up --record --scenario {shlex.quote(str(given.excite))}{still}"
+    on_arm = f"wam up --config {shlex.quote(given.config)} --record --scenario {shlex.quote(str(given.excite))}{still}"
     print(f"written: {given.excite}; on a real arm: {on_arm}", flush=True)
     if given.only_write:
         return None
