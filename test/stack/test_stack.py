@@ -44,7 +44,13 @@ def test_a_recording_is_read_and_analysed() -> None:
     assert repr(wam_stack.analyse(bag)) == repr(wam_stack.analyse(wam_stack.read(bag, ["motor_states"])))
     table = {"time": np.arange(0.0, 5.0, 0.01), "position.elbow": np.sin(np.arange(0.0, 5.0, 0.01))}
     fields = np.rec.fromarrays(list(table.values()), names=list(table))
-    assert repr(wam_stack.analyse(table)) == repr(wam_stack.analyse(fields))
+    known = np.ma.masked_less(fields["position.elbow"], -0.9)
+    unknown, tall = known.filled(np.nan), {title: values[:, None] for title, values in table.items()}
+    masked, lacking = (table | {"position.elbow": one} for one in (known, unknown))
+    for one, other in ((table, fields), (table, tall), (masked, lacking)):
+        assert repr(wam_stack.analyse(one)) == repr(wam_stack.analyse(other))
+    with pytest.raises(BagError, match="'position' has 1000 numbers for 500 times"):
+        wam_stack.analyse({"time": table["time"], "position": np.zeros((500, 2))})
     with pytest.raises(BagError, match="ndarray is no table"):
         wam_stack.analyse(np.zeros((5, 2)))
 

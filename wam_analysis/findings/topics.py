@@ -25,8 +25,8 @@ def topics_section(recording: AnalysedRecording) -> Section:
     clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
     wrong, doubts = [*_treated(found), *clocks], list[str]()
     wrong += [
-        f"{topic}: values jump back and forth from message to message, as if two publishers took turns; "
-        f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
+        f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
+        f"took turns; the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
         for topic in dict.fromkeys(one.topic for one in mixed)
     ]
     for name, columns in bag.topics.items():

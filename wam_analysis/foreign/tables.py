@@ -52,7 +52,8 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     head, *rows = (next(csv.reader([line], delimiter=delimiter, skipinitialspace=delimiter == " ")) for line in lines)
     if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
         raise BagError(
-            f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
+            f"{path} has a row of {len(wide)} cells below {len(head)} titles, its first line; remove the lines "
+            "above the titles, or separate cells by ';' or tabs"
         )
     if not any(map(str.isdecimal, "".join(rows[0]))):
         units, *rows = rows  # below the titles
@@ -114,6 +115,12 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
     _require_one_run(path, times)
+    _require_one_row(path, times, series)
+    for one in (each for columns in found.values() for each in columns):
+        if (number := np.size(one.values)) != len(known):
+            raise BagError(
+                f"column '{one.title}' has {number} numbers for {len(known)} times; it needs one for each time"
+            )
     topics: dict[str, Any] = {}
     for is_command, suffix in ((False, ""), (True, "_command")):
         parts = {q: {one.name: one for one in columns if one.is_command is is_command} for q, columns in found.items()}
@@ -170,6 +177,16 @@ def _require_one_run(path: Path, times: Times) -> None:
             f"{path}: after {again[0] + 1} rows the time goes back by {back:.4g} s, as where a second recording "
             "begins; give each by itself"
         )
+
+
+def _require_one_row(path: Path, times: Times, series: Mapping[str, Any]) -> None:
+    """Refuse a table with several rows at each time, which a column distinguishes, as by the name of a joint."""
+    instants = set(times.tolist())
+    for title, column in series.items() if len(instants) < len(times) else ():
+        names = list(map(str, np.ravel(column)))
+        pairs = set(zip(times.tolist(), names, strict=False))
+        if len(pairs) == len(times) >= STREAM.evenly * len(instants) * len({*names}):
+            raise BagError(f"{path} has several rows at each time, by '{title}'; give each its own columns or table")
 
 
 def _require_once(path: Path, titles: Sequence[str]) -> None:
@@ -250,7 +267,7 @@ def _numbers(column: Any) -> Numbers:
         if a cell has something else.
     """
     try:
-        return np.asarray(column, np.float64)
+        return np.ma.filled(np.ma.asarray(column, np.float64), np.nan).ravel()
     except (TypeError, ValueError):
         texts = [str(one).strip() for one in column]
     last = next((one for one in texts if "," in one and "." in one), "")
