@@ -115,6 +115,10 @@ def sparse() -> list[Case]:
              sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate, "/joint_states: missed periods": 0.0},
              f"in only {kept} of {30.0 * rate:g} messages")
         for name, write, rate, lacks, fields, kept in made
+    ] + [
+        Case("in turns", sqlite, without(without(one("/js", 100.0, 0.7, 0.5), lambda i: i % 2, "effort"),
+                                         lambda i: not i % 2, "position", "velocity"),
+             sine(0.7, 0.5), "1500 of 3000", NOTHING, ("no message has all of position, velocity, effort.",)),
     ]  # fmt: skip
 
 
@@ -128,6 +132,7 @@ def coarse() -> list[Case]:
         ("centiseconds", sqlite, 250.0, lambda t: round(100.0 * t) / 100.0),
         ("two of three", ros1, 150.0, lambda t: math.floor(50.0 * t) / 50.0),
         ("never set", by_mcap_ros2, 50.0, lambda t: -1.7e9),
+        ("the first from before", sqlite, 100.0, lambda t: t - 3600.0 * (t == 0.0) + 1e-6 * math.sin(9.0 * t)),
         ("milliseconds", by_mcap_ros2, 400.0, lambda t: round(t, 3)),
         ("set forward", sqlite, 100.0, lambda t: t + 0.4 * (t > 11.0)),
     ]
@@ -230,12 +235,17 @@ def called_as_commands() -> list[Case]:
     force[:, 2] = 3.0 * np.sin(2.0 * np.pi * 2.1 * np.arange(3000) / 100.0)
     cycle = {"/cmd/wrench force.z: frequency": 2.1, "/cmd/wrench force.z: cycle, peak to peak": 6.0}
     named = topic_map(["/goal/ref"], [], [], [], [])
+    time = np.arange(0.0, 20.0, 0.002)
+    path = np.sin(np.outer(time, (1.4, 2.6, 5.2, 10.7)) + np.arange(4.0) ** 3) @ [[0.5], [0.3], [0.15], [0.06]]
     return [
         Case("target", by_rosbags, one("/target/joint_states", 100.0, 0.7, 0.5), expected),
         Case("desired", sqlite, one("/arm_desired/desired", 200.0, 0.7, 0.5), expected),
         Case("goal", ros1, one("/goal/ref", 125.0, 0.7, 0.5), expected, "", named),
         Case("wrench", by_mcap_ros2, wrenches("/cmd/wrench", np.arange(3000) / 100.0, force), cycle),
-    ]
+        Case("at another rate", by_rosbags, joints("/js", time, ["a"], position=path) +
+             joints("/cmd", time[::10], ["a"], position=path[::10]), {}, "", topic_map([], [], ["/cmd"], [], []),
+             ("Shows: nothing that can be evaluated.",)),
+    ]  # fmt: skip
 
 
 def few_cycles() -> list[Case]:
@@ -376,6 +386,8 @@ def formats() -> list[Case]:
     commanded = topic_map([], [], ["/force_command"], [], [])
     return [
         Case("JSON in a directory", json_directory, sent, {"a: frequency": 0.7}, "", MAPPED),
+        Case("the number of a motor", by_json, [s._replace(fields=s.fields | {"name": 7}) for s in sent],
+             {"7: frequency": 0.7}, "", MAPPED),
         Case("JSON of ROS", lambda path, sent: by_json(path, sent, "sensor_msgs/JointState"),
              without(one("/joint_states", 100.0, 0.7, 0.5), lambda _: True, "velocity"), sine(0.7, 0.5) | FRICTION),
         Case("slash of a frame", by_rosbags, frames, step, "", commanded),
@@ -415,17 +427,10 @@ def wrong_efforts() -> list[Case]:
 
     return [
         Case("sign", sqlite, changed(lambda e: -e), sine(0.7, 0.5), "as if the effort had the other sign"),
-        Case(
-            "noise",
-            by_rosbags,
-            changed(lambda e: chance.normal(size=1)),
-            sine(0.7, 0.5),
-            "",
-            NOTHING,
-            ("a: friction is not identified: the errors are too large (dry friction ", "; the model leaves "),
-        ),
+        Case("noise", by_rosbags, changed(lambda e: chance.normal(size=1)), sine(0.7, 0.5), "", NOTHING,
+             ("a: friction is not identified: the errors are too large (dry friction ", "; the model leaves ")),
         Case("limited", by_rosbags, changed(lambda e: np.clip(e, -1.6, 1.6)), sine(0.7, 0.5), "as if it was limited"),
-    ]
+    ]  # fmt: skip
 
 
 def other_units() -> list[Case]:
@@ -615,23 +620,13 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     [
         ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
         ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
-        (
-            "time,position.a\n0,1\n0.1,ERR\n",
-            NOTHING,
-            "'position.a': a cell has 'ERR', which is no number; leave it empty, or",
-        ),
-        (
-            "time,position.a\n0,1\n# end,\n",
-            NOTHING,
-            "'time': a cell has '# end', which is no number; .* dates are read",
-        ),
+        ("time,position.a\n0,1\n0.1,ERR\n", NOTHING, "'position.a': a cell has 'ERR', which is no number; leave it"),
+        ("time,position.a\n0,1\n# end,\n", NOTHING, "'time': a cell has '# end', which is no number; .* dates are re"),
+        ("Date\t27\ntime\tposition.a\tvelocity.a\n0\t1\t2\n", NOTHING, "below 2 titles, its first line; remove"),
         ('time,position.a,velocity.a,effort.a\n0,"1,2,3\n' + 2**15 * "1,1,2,3\n", NOTHING, "cell has '1,2,3', which"),
         ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
-        (
-            "time,position.a\n" + 2 * "".join(f"{i},1\n" for i in range(200)),
-            NOTHING,
-            "after 200 rows the time goes back",
-        ),
+        ("time,position.a\n" + 2 * "".join(f"{i},1\n" for i in range(200)), NOTHING, "after 200 rows the time goes"),
+        ("time,position,of\n" + "".join(f"{i // 3},{i},j{i % 3}\n" for i in range(90)), NOTHING, "each time, by 'of'"),
         ("time,position.a\n0,1\n", topic_map([], [], ["/a"], [], []), "titles command.position.JOINT"),
         ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
     ],

@@ -37,7 +37,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if not _is_known(found):
             if not unlike and np.any(one.values.get("effort", 0.0)) and len(one.values) > 1 and not rests(one):
                 which = wrong if found.dynamic.is_negative else doubts
-                which.append(f"{one.label}: friction is not identified: {_lacking(every, found.unexplained)}.")
+                which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue
         numbers = [number for number in every if number[2].is_sure]
         findings += [
@@ -74,10 +74,12 @@ def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:
     return ", ".join(f"{what} {shown(known.value)} +- {shown(known.error, unit)}" for what, unit, known in numbers)
 
 
-def _lacking(numbers: Sequence[tuple[str, str, FrictionNumber]], unexplained: float) -> str:
+def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], unexplained: float) -> str:
     """Which condition of an identified friction is not met."""
     if below := [number for number in numbers if number[2].is_negative]:
         return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
+    if not len(one.only(*one.values).time):
+        return f"no message has all of {', '.join(one.values)}"
     if math.isnan(numbers[0][2].value):
         part = f"it moved in one direction for more than {100.0 * (1.0 - SHAFT.both_ways):g} % of its way"
         return f"{part}, or for fewer than {SHAFT.fewest_samples} samples apart from its reversals"

@@ -136,12 +136,13 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
                 result.append(FoundCycle(one, LIMIT_CYCLE))
         else:
             result.append(FoundCycle(one, COMMANDED_CYCLE))
-    if rest is None:
+    if rest is None or command is None:
         return result
+    rate = 1.0 / float(np.median(np.diff(command.time)))
     for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
-        if abs(frequency * one.cycle.period - 1.0) <= CYCLE.same_frequency:
-            continue  # the commanded motion itself, which it does not follow linearly
+        if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_frequency:
+            continue  # the commanded motion itself, which it does not follow linearly, or the steps of its messages
         error = (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak
         result.append(FoundCycle(one, HARMONIC if _is_harmonic(one, frequency) else LIMIT_CYCLE, error))
     return result

@@ -108,7 +108,8 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
 def rising(stamps: Times, received: Times) -> Times:
     """The stamps, or the times of reception where the stamps are of a clock that was set, reset or never set.
 
-    A few stamps that are years away from their reception, such as 0, are replaced by it.
+    A few stamps that are years away from their reception, such as 0, are replaced by it, and so is that of a first
+    message that waited for the recorder.
     """
     away = np.abs(stamps - received) > STREAM.away
     if 2 * np.count_nonzero(away) < len(stamps):
@@ -117,6 +118,8 @@ def rising(stamps: Times, received: Times) -> Times:
     if not len(steps):
         return stamps
     keeps_pace = abs(np.median(arrivals) - np.median(steps)) <= STREAM.pace * np.median(steps)
+    if keeps_pace and steps[0] > arrivals[0] + STREAM.reset:
+        return rising(np.concatenate([stamps[1:2] - arrivals[:1], stamps[1:]]), received)
     is_reset = not np.any(steps) or np.any(steps < -STREAM.reset) or (keeps_pace and _is_set(stamps, received))
     return received if is_reset else stamps
 

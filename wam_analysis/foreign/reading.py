@@ -202,7 +202,8 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
     for k, message in enumerate(columns.messages):
         widths = tuple(len(taken[q][k]) if q in taken else 0 for q in IN_JOINTS)
         fitting = given.joints if len(given.joints) == max(widths) else ()
-        names = tuple(_at(topic, message, fields["name"])) if "name" in fields else fitting
+        named = _at(topic, message, fields["name"]) if "name" in fields else fitting
+        names = tuple(map(str, np.atleast_1d(named).tolist()))  # a single one, and numbers of motors, too
         if 0 < len(names) < max(widths) and given.fields.items() & fields.items():
             raise ValueError(f"{topic} has {max(widths)} values for {len(names)} names in a message; map other fields")
         alike.setdefault((frames[k], names, widths), []).append(k)
