@@ -294,7 +294,7 @@ def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower
     assert all(math.isnan(one.force_error) for one in summary.contacts)  # the force may be the least one
     section = section_of(recording.bag(), "contact")
     assert f"Positions of contacts: {NOT_PLACED}." in section.sentences
-    errors = [one for one in section.findings if one.quantity == "error of the force's magnitude"]
+    errors = [one for one in section.findings if one.quantity == "error of the median force"]
     assert {one.note for one in errors} == {"not known: the force may be a lower bound"}
     recording.without = ("contact/hypotheses",)  # with contact/point it is known
     outer, inner, *_ = recording.summary().contacts

@@ -108,9 +108,9 @@ def _numbers(name: str, contact: ListedContact, period: float, declared: float) 
     yield Finding(f"{name}: declared position", "cm", cm * declared)
     least = "lower bound: the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
-    yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error, note="of the medians")
+    yield Finding(f"{name}: error of the median position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be a lower bound" * (not one.is_placed)
-    yield Finding(f"{name}: error of the force's magnitude", "N", contact.force_error, note=least or unknown)
+    yield Finding(f"{name}: error of the median force", "N", contact.force_error, note=least or unknown)
     is_early = contact.latency <= 0.0
     note = f"time until its detection, to within {1e3 * period:.0f} ms" if not is_early else "reported before it began"
     yield Finding(f"{name}: latency", "ms", math.nan if is_early else 1e3 * contact.latency, note=note)
