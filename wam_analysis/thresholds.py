@@ -48,6 +48,7 @@ class ShaftThresholds:
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1
+    filtered: int = 4  # lags of an effort after which a filter, of that time constant, has left 2 % of a step
     limited: float = 0.1  # of the time, in which an effort is exactly at its bounds
     agree: float = 0.1  # by which a recorded velocity may differ from the rate of the position
     late: float = 0.02  # of a velocity, by which a delay or a scale changes it: less is not seen in the friction

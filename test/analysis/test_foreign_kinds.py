@@ -584,7 +584,7 @@ def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: P
     titles, columns = table_of(how)
     source: Any = dict(zip(WITH_UNITS if how.below else titles, columns, strict=True))  # a file alone has such a row
     if is_file:
-        source = tmp_path / "table.csv"
+        source = tmp_path / ("table.CSV" if how.below else "table.txt" if how.comment else "table.csv")
         with source.open("w", newline="") as stream:
             stream.write(how.comment)
             writer = csv.writer(stream, delimiter=how.delimiter)
@@ -620,7 +620,7 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     [
         ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
         ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
-        ("time,position.a\n0,1\n0.1,ERR\n", NOTHING, "'position.a': a cell has 'ERR', which is no number; leave it"),
+        ('"time", "position.a"\n0,1\n0.1, "ERR"\n', NOTHING, "'position.a': a cell has 'ERR', which is no number; lea"),
         ("time,position.a\n0,1\n# end,\n", NOTHING, "'time': a cell has '# end', which is no number; .* dates are re"),
         ("Date\t27\ntime\tposition.a\tvelocity.a\n0\t1\t2\n", NOTHING, "below 2 titles, its first line; remove"),
         ('time,position.a,velocity.a,effort.a\n0,"1,2,3\n' + 2**15 * "1,1,2,3\n", NOTHING, "cell has '1,2,3', which"),

@@ -108,7 +108,7 @@ def analyse(
         return analyse_bag(bag, progress, given=given)
     path = Path(source)
     progress(f"reading {path}")
-    found = None if path.suffix == ".csv" else read(path, ())
+    found = None if path.suffix.lower() in (".csv", ".tsv", ".txt") else read(path, ())
     if found is not None and not any(found.counts.values()):
         raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
     if found is not None and not given.is_given and _is_own(found):

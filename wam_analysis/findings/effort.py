@@ -186,14 +186,17 @@ def friction(source: Source) -> tuple[Friction, float]:
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     time = period * np.arange(len(velocity), dtype=np.float64)
 
-    def fit(shift: int) -> Friction:
-        """Friction with the effort of `shift` samples later."""
-        return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, load=loads)
+    def fit(shift: int, after: int = 0) -> Friction:
+        """Friction with the effort of `shift` samples later, but for so many samples `after` each reversal."""
+        use = np.sign(velocity) == np.sign(np.roll(velocity, after))
+        return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, use, loads)
 
     width = round(window / period)
     own, noise = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = bool(weight) and own < SHAFT.apart
     found, shift = (fit(0), 0) if one_frequency else _best(fit, math.ceil(SHAFT.longest_effort_lag / period))
+    if shift and _is_known(settled := fit(shift, SHAFT.filtered * abs(shift))):
+        found = settled  # where it is filtered, its step at a reversal is no delay
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 

@@ -178,8 +178,7 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
 
 
 def _frames(columns: Messages) -> Texts:
-    heads = [getattr(message, "header", None) for message in columns.messages]
-    return np.array([str(getattr(head, "frame_id", "")).removeprefix("/") for head in heads], object)
+    return np.array([str(getattr(getattr(one, "header", 0), "frame_id", "")) for one in columns.messages], object)
 
 
 def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:

@@ -21,7 +21,7 @@ from wam_bag.columns import JOINT_FIELDS, joint_names
 
 TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](?!\d+[\])])(.*)[\])]\s*)?")  # and the unit behind it; q[0] has none
 ABOVE = re.compile(r"#|sep=")  # begins a line above the titles
-DELIMITERS = ",;\t|"  # or blanks, if the titles have none of these
+DELIMITERS = " ,;\t|"  # blanks, if the titles have none of the others
 NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was not recorded
 COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
@@ -47,9 +47,9 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         del lines[0]  # a comment above the titles, which may begin with '#', too, or what names the delimiter
     if len(lines) < 2:
         raise BagError(f"{path} has no row below the names of its columns")
-    delimiter = max(DELIMITERS, key=lines[0].count) if any(map(lines[0].count, DELIMITERS)) else " "
+    delimiter = max(DELIMITERS, key=lines[0].replace(" ", "").count)
     # line by line, so that a quote that is not closed ends with its row
-    head, *rows = (next(csv.reader([line], delimiter=delimiter, skipinitialspace=delimiter == " ")) for line in lines)
+    head, *rows = (next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)) for line in lines)
     if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles, its first line; remove the lines "
@@ -104,7 +104,8 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     series, given = _with_one_time(series, given)
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
-    used = {one.title for columns in found.values() for one in columns} | {"index"}  # which a data frame has
+    every = [one for columns in found.values() for one in columns]
+    used = {one.title for one in every} | {"index"}  # which a data frame has
     for quantity in (*JOINT_FIELDS, "force", "torque"):
         if any(one.has_unit for one in found[quantity]):
             units[quantity] = found[quantity][0][:2]
@@ -116,7 +117,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
     _require_one_run(path, times)
     _require_one_row(path, times, series)
-    for one in (each for columns in found.values() for each in columns):
+    for one in every:
         if (number := np.size(one.values)) != len(known):
             raise BagError(
                 f"column '{one.title}' has {number} numbers for {len(known)} times; it needs one for each time"
@@ -181,11 +182,11 @@ def _require_one_run(path: Path, times: Times) -> None:
 
 def _require_one_row(path: Path, times: Times, series: Mapping[str, Any]) -> None:
     """Refuse a table with several rows at each time, which a column distinguishes, as by the name of a joint."""
-    instants = set(times.tolist())
-    for title, column in series.items() if len(instants) < len(times) else ():
-        names = list(map(str, np.ravel(column)))
-        pairs = set(zip(times.tolist(), names, strict=False))
-        if len(pairs) == len(times) >= STREAM.evenly * len(instants) * len({*names}):
+    rows = times.tolist()
+    instants = len({*rows})
+    for title, column in series.items() if instants < len(rows) else ():
+        names = [*map(str, np.ravel(column))]
+        if len({*zip(rows, names, strict=False)}) == len(rows) >= STREAM.evenly * instants * len({*names}):
             raise BagError(f"{path} has several rows at each time, by '{title}'; give each its own columns or table")
 
 
