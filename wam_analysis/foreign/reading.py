@@ -178,7 +178,8 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
 
 
 def _frames(columns: Messages) -> Texts:
-    return np.array([str(getattr(getattr(one, "header", 0), "frame_id", "")) for one in columns.messages], object)
+    found = (str(getattr(getattr(one, "header", 0), "frame_id", "")) for one in columns.messages)
+    return np.array([frame.removeprefix("/") for frame in found], object)
 
 
 def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
