@@ -199,7 +199,8 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
     try:
         for message in islice(stack.messages(given.topic, check=check), given.count):
             taken, is_reported = taken + 1, False
-            print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
+            fields = plain(message, given.topic)
+            print(yaml.safe_dump(fields, sort_keys=False, default_flow_style=None, width=math.inf), end="---\n")
             sys.stdout.flush()
     except TimeoutError as error:
         print(f"wam call: {error}", file=sys.stderr)
