@@ -104,7 +104,7 @@ def test_a_push_reaches_the_arm_and_a_wrong_one_is_refused(stack: None) -> None:
     assert called("tare") == (0, "the present external torques now count as zero in the force loop\n", "")
     code, out, _ = called("push", "outer_link", "0", "12", "0", "--at", "0.3", "--seconds", "0.5")
     assert (code, out.startswith("pushed outer_link with 12 N at 0.30 m")) == (0, True)
-    assert "push one of inner_link, outer_link" in called("push", "hand", "0", "0", "1")[2]
+    assert "this arm has inner_link, outer_link" in called("push", "hand", "0", "0", "1")[2]
     assert "--at is 2 m" in called("push", "outer_link", "0", "0", "1", "--at", "2")[2]
     too_much = "the force is 600 N; allowed: up to disturbance_force_limit, 500 N"
     assert too_much in called("push", "outer_link", "0", "-6e2", "0")[2]

@@ -118,7 +118,8 @@ def step_section(recording: AnalysedRecording) -> Section:
         error, size = shown(worst.error, "N"), shown(worst.commanded, "N")
         verdict = f"{counted(len(steps), 'force step')}; the largest steady error is {error} of {size}."
         return Section("force", "Force", (*sentences, *doubts), findings, (), (verdict,), doubts)
-    return Section("force", "Force", doubts or ["No step of a commanded force was recorded."], wrong=doubts)
+    hint = "; name the topic of its command with --command" * any(not one.is_joint and not followed for one in states)
+    return Section("force", "Force", doubts or [f"No step of a commanded force was recorded{hint}."], wrong=doubts)
 
 
 def _arrival(command: Source) -> str:

@@ -104,7 +104,8 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     least = shown(min(begins), "Hz")
     span = f"To find vibrations below {least}, record a longer part without a gap."
     ranges = ", ".join(f"{shown(size, unit)} ({label})" for unit, (size, label) in varied.items())
-    silent = [] if findings else [f"No vibration was found above {least}. Largest range of a value: {ranges}."]
+    none = f"No vibration was found above {least} that lasts throughout. Largest minus smallest value: {ranges}."
+    silent = [] if findings else [none]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 

@@ -229,7 +229,7 @@ def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrenc
     shared = build_part(Shared, driver)
     covers = shared.arm.covers
     if given.cover not in covers.names:
-        raise ValueError(f"no link '{given.cover}'; push one of {', '.join(covers.names)}")
+        raise ValueError(f"no link '{given.cover}'; this arm has {', '.join(covers.names)}")
     i = 3 * covers.names.index(given.cover)
     low, high = covers.start[i], covers.end[i]
     at = 0.5 * (low + high) if given.at is None else given.at

@@ -146,7 +146,7 @@ def _listen(configuration: Configuration, seconds: float) -> int:
     """Print what is on the bus, and what the driver would send."""
     own = configuration.node("driver", BusParameters)
     line = line_of(configuration.shared, own, time)
-    print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)
+    print(f"heard on {own.interface} {own.channel} within {seconds:g} s, while this program sent nothing:", flush=True)
     try:
         print(*heard(line, seconds), sep="\n")
     finally:
