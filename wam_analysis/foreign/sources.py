@@ -206,7 +206,7 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
     changed = np.any(numbers[1:] != numbers[:-1], axis=1)
     kept, what = np.concatenate([[True], ~same]), Treatment.TWICE
-    is_uneven = not number and np.std(steps) > STREAM.pace * np.median(steps)
+    is_uneven = len(steps) > 0 and not number and np.std(steps) > STREAM.pace * np.median(steps)
     if is_uneven and 0.0 < np.mean(changed) <= STREAM.relayed:
         kept = ~np.all([_held_over(column) for column in numbers.T if np.ptp(column)], axis=0)
         what = Treatment.RELAYED
