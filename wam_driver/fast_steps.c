@@ -179,8 +179,8 @@ static PyObject *prepare(PyObject *Py_UNUSED(self), PyObject *args) {
   Plant given;
   if (!PyArg_ParseTuple(args, "nnnnnnnOO!O!O!O!O!OO!ddd", &model, &data, &first, &second, &apply, &set, &clock,
                         &given.error, &PyList_Type, &given.laws, &PyList_Type, &given.low, &PyList_Type, &given.high,
-                        &PyList_Type, &given.direction, &PyList_Type, &given.each, &given.circuits, &PyDict_Type, &given.pushes,
-                        &given.step, &given.smallest, &given.sharpness))
+                        &PyList_Type, &given.direction, &PyList_Type, &given.each, &given.circuits, &PyDict_Type,
+                        &given.pushes, &given.step, &given.smallest, &given.sharpness))
     return NULL;
   given.given = args, given.model = (const mjModel *)model, given.data = (mjData *)data;
   given.first = (Step)first, given.second = (Step)second, given.apply = (Apply)apply, given.set = (SetHandler)set;

@@ -167,7 +167,7 @@ def test_motors_show_what_their_load_swings_by_between_its_samples() -> None:
         WAM, time, nothing, velocity, nothing, nothing, CABLE, sampled, sampled, nothing, nothing, nothing, ()
     )
     moved = signals._replace(torque=signals.rotors + swing[:, np.newaxis])
-    assert _unrecorded(moved, 0)[:, 1] == pytest.approx(swing)
+    assert _unrecorded(moved)[:, 0, 1] == pytest.approx(swing)
 
 
 def test_a_push_is_in_no_friction_where_only_gravity_is_known(moving: Recorded) -> None:

@@ -11,7 +11,7 @@ from wam_analysis.foreign.sources import Piece, Source, pieces, rests, ways
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
-from wam_bag.arrays import Numbers
+from wam_bag.arrays import Mask, Numbers
 
 RECORD = (
     "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
@@ -186,17 +186,18 @@ def friction(source: Source) -> tuple[Friction, float]:
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     time = period * np.arange(len(velocity), dtype=np.float64)
 
-    def fit(shift: int, after: int = 0) -> Friction:
-        """Friction with the effort of `shift` samples later, but for so many samples `after` each reversal."""
-        use = np.sign(velocity) == np.sign(np.roll(velocity, after))
+    def fit(shift: int, use: Mask | None = None) -> Friction:
+        """Friction with the effort of `shift` samples later, from the samples that may be used, all by default."""
         return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, use, loads)
 
     width = round(window / period)
     own, noise = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = bool(weight) and own < SHAFT.apart
     found, shift = (fit(0), 0) if one_frequency else _best(fit, math.ceil(SHAFT.longest_effort_lag / period))
-    if shift and _is_known(settled := fit(shift, SHAFT.filtered * abs(shift))):
-        found = settled  # where it is filtered, its step at a reversal is no delay
+    if shift:  # where the effort is filtered, its step at a reversal is no delay
+        before = np.roll(velocity, SHAFT.filtered * abs(shift))
+        settled = fit(shift, np.sign(velocity) == np.sign(before))
+        found = settled if _is_known(settled) else found
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 

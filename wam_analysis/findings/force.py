@@ -11,6 +11,7 @@ from wam_analysis.held_messages import step_at
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
+from wam_control.force.guard import margin_text
 from wam_control.force.thresholds import GUARD
 from wam_description.event import Code
 from wam_description.number_text import apart
@@ -198,8 +199,9 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     if not recording.held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
-    margins = [(one.guarded.assessment.scale, one.guarded.margin) for one in recording.theories.values() if one.guarded]
-    margin = f"; predicted stable up to {min(margins)[1]} times the gains at the start" if margins else ""
+    margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
+    least = margin_text(min(margins, default=math.nan), digits=3)
+    margin = f"; predicted stable up to {least} times the gains at the start" * bool(margins)
     if settled and not verdict and not wrong:
         whose = "controlled forces" if refused else "forces"
         count = "all" if settled == len(held) else f"{settled} of {len(held)}"

@@ -17,8 +17,8 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers
 from wam_control.force.force_loop_parameters import force_law, task_of
+from wam_control.force.guard import margin_text
 from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of
-from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -188,18 +188,13 @@ class Guarded(NamedTuple):
     posture: str
 
     @property
-    def margin(self) -> str:
-        """The gain margin as text."""
-        return shown(self.assessment.scale) + " or more" * (self.assessment.scale >= GUARD.largest_scale)
-
-    @property
     def sentence(self) -> str:
         """The result as a sentence."""
         domain, scale = self.assessment.domain, self.assessment.scale
         stable = "linearly stable with up to" if scale >= 1.0 else "NOT linearly stable with more than"
         return (
             f"Stability guard (sampled loop with its velocity loops, contact of {shown(self.surface)} N/m, "
-            f"{self.posture}): domain {domain}, {stable} {self.margin} times the gains at the start."
+            f"{self.posture}): domain {domain}, {stable} {margin_text(scale, digits=3)} times the gains at the start."
         )
 
 

@@ -216,7 +216,7 @@ def _friction_of_motors(signals: TransmissionSignals, parameters: PredictionPara
 
     Their torque is that of the period that ends at its stamp, and so is their velocity here.
     """
-    free = signals.torque - signals.load
+    free, unrecorded = signals.torque - signals.load, _unrecorded(signals)
     velocity = signals.velocity.copy()
     velocity[1:] = 0.5 * (signals.velocity[1:] + signals.velocity[:-1])
     return {
@@ -228,7 +228,7 @@ def _friction_of_motors(signals: TransmissionSignals, parameters: PredictionPara
                 SHAFT.motor_rest,
                 SHAFT.window,
                 signals.use,
-                waves=np.hstack([_waves(signals, i, name, parameters), _unrecorded(signals, i)]),
+                waves=np.hstack([_waves(signals, i, name, parameters), unrecorded[:, i]]),
             )
         )
         for i, name in enumerate(signals.arm.motors.names)
@@ -249,16 +249,17 @@ def _waves(signals: TransmissionSignals, motor: int, shaft: str, parameters: Pre
     return np.column_stack(both) if both else np.empty((len(angle), 0))
 
 
-def _unrecorded(signals: TransmissionSignals, motor: int) -> Numbers:
-    """What a motor's load may differ by from the recorded one, (k, 2), N m: within a period, and between its samples.
+def _unrecorded(signals: TransmissionSignals) -> Numbers:
+    """What loads may differ by from the recorded ones, (k, n, 2), N m: within a period, and between their samples.
 
-    It is that of an instant within half a period of the middle of one. Between its samples, the motor's torque less
-    that of its rotor shows what a straight line misses: cables swing in time with commands that are as far apart.
+    They are those of an instant within half a period of the middle of one. Between their samples, a motor's torque
+    less that of its rotor shows what a straight line misses: cables swing in time with commands that are as far apart.
     """
     time, rows = signals.time, np.unique([0, *np.flatnonzero(signals.sampled)])
-    passed = (signals.torque - signals.rotors)[:, motor]
-    late = 0.5 * np.median(np.diff(time)) * np.gradient(signals.load[:, motor], time)
-    return np.column_stack([late, passed - np.interp(time, time[rows], passed[rows])])
+    passed = signals.torque - signals.rotors
+    straight = np.column_stack([np.interp(time, time[rows], one[rows]) for one in passed.T])
+    late = 0.5 * np.median(np.diff(time)) * np.gradient(signals.load, time, axis=0)
+    return np.stack([late, passed - straight], axis=2)
 
 
 def _friction_of_joints(signals: TransmissionSignals) -> dict[str, Friction]:

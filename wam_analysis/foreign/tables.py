@@ -186,7 +186,8 @@ def _require_one_row(path: Path, times: Times, series: Mapping[str, Any]) -> Non
     instants = len({*rows})
     for title, column in series.items() if instants < len(rows) else ():
         names = [*map(str, np.ravel(column))]
-        if len({*zip(rows, names, strict=False)}) == len(rows) >= STREAM.evenly * instants * len({*names}):
+        is_even = len(rows) >= STREAM.evenly * instants * len({*names})
+        if is_even and len({*zip(rows, names, strict=False)}) == len(rows):
             raise BagError(f"{path} has several rows at each time, by '{title}'; give each its own columns or table")
 
 

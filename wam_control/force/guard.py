@@ -234,8 +234,8 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
     facts = {
         "guard.mode": mode,
         "domain": str(assessment.domain),
-        "margin": _margin(assessment.scale),
-        "margin here": _margin(here, watch.needed if watch.assessed else GUARD.largest_scale),
+        "margin": margin_text(assessment.scale),
+        "margin here": margin_text(here, watch.needed if watch.assessed else GUARD.largest_scale),
         "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
         if watch.assessed
         else UNKNOWN,
@@ -265,6 +265,6 @@ def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:
     return "; ".join(f"{name} {listed(np.atleast_1d(getattr(taken, name)).tolist())}" for name in names)
 
 
-def _margin(scale: float, largest: float = GUARD.largest_scale) -> str:
+def margin_text(scale: float, largest: float = GUARD.largest_scale, digits: int = 4) -> str:
     """Factor by which the gains may be larger, of which no more than `largest` was tried."""
-    return f"{largest:.4g} or more" if scale >= largest else f"{scale:.4g}"
+    return f"{min(scale, largest):.{digits}g}{' or more' * (scale >= largest)}"
