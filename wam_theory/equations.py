@@ -1,6 +1,6 @@
 """Every numbered equation of chapters 2 to 6: its content, and the correction of its misprint.
 
-A function that implements an equation cites its number in the first line of its docstring; `docs/equations.md`
+A function that implements an equation cites its number in the first line of its docstring; `docs/thesis.md`
 is generated from these citations and from this table.  Reasons of the corrections: `docs/errata.md`.
 """
 

@@ -1,4 +1,4 @@
-"""A nearly straight arm that presses ahead and aside (docs/force.md)."""
+"""A nearly straight arm that presses ahead and aside (docs/experiments.md)."""
 
 import math
 from itertools import product

@@ -102,7 +102,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     """Tasks, each drawn from the seed and its number alone."""
 
     title = "force control on random surfaces in random poses"
-    page = "docs/force.md"
+    page = "docs/experiments.md"
     seeds = (1,)
     count = 100
 
