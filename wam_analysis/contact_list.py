@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from wam_analysis.held_messages import held_rows, step_at
 from wam_analysis.measures.runs import runs
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import HYPOTHESIS, NAN, ForceSignal, Traces, most_probable
-from wam_bag.arrays import Index, Mask, Names, Numbers, Times
+from wam_bag.arrays import Mask, Names, Numbers, Times
 from wam_description.event_text import REASONS
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 
@@ -27,33 +27,6 @@ CUT = (  # off by the recording, or where the signal is missing and comes again
 )
 
 
-class Estimate(NamedTuple):
-    """What was estimated in some time of contact; medians, NaN if unknown.
-
-    Attributes
-    ----------
-    link : estimated most of the time, 'none' if no contact was.
-    lasting : fraction of the time in which that link was estimated.
-    probability : of that link.
-    position, position_sd : m along the link.
-    is_placed : whether positions were recorded.
-    force, force_sd : size, N.
-    is_lower_bound : whether that is the least force that explains the torques.
-    reasons : why the estimate is not to be trusted for most of the time.
-    """
-
-    link: str
-    lasting: float
-    probability: float
-    position: float
-    position_sd: float
-    is_placed: bool
-    force: float
-    force_sd: float
-    is_lower_bound: bool
-    reasons: tuple[str, ...]
-
-
 class ListedContact(NamedTuple):
     """An estimated contact, or the part of it in one step of a scenario, or under one command; medians, NaN if unknown.
 
@@ -62,6 +35,14 @@ class ListedContact(NamedTuple):
     step : name of the step, '' outside of a scenario.
     begin, end : s of the arm's time; from the start of the recording where that is a system's clock.
     cut : what cuts it off there, '' for nothing.
+    link : estimated most of the time.
+    lasting : fraction of the time in which that link was estimated.
+    probability : of that link.
+    position, position_sd : m along the link.
+    is_placed : whether positions were recorded.
+    force, force_sd : size, N.
+    is_lower_bound : whether that is the least force that explains the torques.
+    reasons : why the estimate is not to be trusted for most of the time.
     true : the true link, 'none' where nothing was touched, '' where the true contact was not recorded.
     true_position, true_force : m and N; of that link, in the same time.
     latency : s from the last instant without the true contact to this detection; not above zero if the contact was
@@ -72,7 +53,16 @@ class ListedContact(NamedTuple):
     begin: float
     end: float
     cut: tuple[str, str]
-    estimate: Estimate
+    link: str
+    lasting: float
+    probability: float
+    position: float
+    position_sd: float
+    is_placed: bool
+    force: float
+    force_sd: float
+    is_lower_bound: bool
+    reasons: tuple[str, ...]
     true: str
     true_position: float
     true_force: float
@@ -86,14 +76,13 @@ class ListedContact(NamedTuple):
     @property
     def position_error(self) -> float:
         """Estimated less true position, m; NaN where either is unknown or the link is another one."""
-        return self.estimate.position - self.true_position if self.true == self.estimate.link else NAN
+        return self.position - self.true_position if self.true == self.link else NAN
 
     @property
     def force_error(self) -> float:
         """Estimated less true size of the force, N; NaN as that of the position, and of what may be a lower bound."""
-        found = self.estimate
-        is_known = self.true == found.link and found.is_placed and not found.is_lower_bound
-        return found.force - self.true_force if is_known else NAN
+        is_known = self.true == self.link and self.is_placed and not self.is_lower_bound
+        return self.force - self.true_force if is_known else NAN
 
 
 class TouchedLink(NamedTuple):
@@ -132,26 +121,17 @@ class TouchedLink(NamedTuple):
 Certainty = dict[str, Numbers]  # columns of `contact/hypotheses` at each instant; NaN where they are not known
 
 
-def _certainty_of(run: RecordedRun, traces: Traces) -> Certainty:
-    """Of the estimated contact at each instant."""
-    numbers = {name: np.full(len(traces.stamp), NAN) for name in HYPOTHESIS}
+def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
+    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends."""
+    certainty = {name: np.full(len(traces.stamp), NAN) for name in HYPOTHESIS}
     if (hypotheses := most_probable(run)) is not None:
         stamps, columns = hypotheses
         row, known = held_rows(stamps, traces.stamp)
-        for name, values in numbers.items():
-            values[known] = columns[name][row[known]]
-    return numbers
-
-
-def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
-    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends."""
-    certainty = _certainty_of(run, traces)
-    bounds = [step.begin for step in steps]
-    rows = cut_at(traces.stamp, contacts_by_link(traces.stamp, traces.estimated), bounds)
+        certainty = {name: np.where(known, columns[name][row], NAN) for name in HYPOTHESIS}
     detected = list(_detections(traces))
     return tuple(
         _listed(traces, certainty, steps, begin, end, next((late for row, late in detected if begin <= row < end), NAN))
-        for begin, end in rows
+        for begin, end in _parts(traces.stamp, traces.estimated, steps)
     )
 
 
@@ -162,7 +142,7 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
     that of the contact before goes on.
     """
     estimated, last = traces.estimated, 0
-    for begin, end in contacts_by_link(traces.stamp, traces.true):
+    for begin, end in _parts(traces.stamp, traces.true):
         before, last = last, end
         seen = np.flatnonzero(estimated.acts[begin:end])
         if _cut(traces.true, begin, end)[0] or not len(seen):
@@ -181,7 +161,7 @@ def true_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[Touche
     """The true contacts, by link and step, and what was estimated of each, as far as both were recorded."""
     true, estimated = traces.true, traces.estimated
     found = []
-    for begin, end in cut_at(traces.stamp, contacts_by_link(traces.stamp, true), [step.begin for step in steps]):
+    for begin, end in _parts(traces.stamp, true, steps):
         acting = begin + np.flatnonzero(true.acts[begin:end])
         known = acting[estimated.is_known[acting]]
         same = estimated.acts[known] & (estimated.frame[known] == true.frame[known])
@@ -233,82 +213,65 @@ def _cut(signal: ForceSignal, begin: int, end: int) -> tuple[str, str]:
     return before, after
 
 
-def contacts_by_link(stamp: Times, signal: ForceSignal) -> list[tuple[int, int]]:
-    """Rows [begin, end) of each contact, cut where the link changes."""
-    return [part for begin, end in contact_rows(stamp, signal.acts) for part in _links(stamp, signal, begin, end)]
+def _parts(stamp: Times, signal: ForceSignal, steps: Sequence[RecordedStep] = ()) -> Iterator[tuple[int, int]]:
+    """Rows [begin, end) of each contact, cut where the link changes and where a step begins.
+
+    A change of the link that is shorter than `bounce` is none, and no part at a step is, if its contact is not.
+    """
+    starts = np.searchsorted(stamp, [step.begin for step in steps]).tolist()
+    for begin, end in contact_rows(stamp, signal.acts):
+        first = begin
+        for last in (*_changes(stamp, signal, begin, end), end):
+            for cut in starts:
+                if first < cut < last and min(stamp[cut] - stamp[first], stamp[last - 1] - stamp[cut]) >= TOUCH.bounce:
+                    yield first, cut
+                    first = cut
+            yield first, last
+            first = last
 
 
-def _links(stamp: Times, signal: ForceSignal, begin: int, end: int) -> list[tuple[int, int]]:
-    """Parts of a contact, each on another link; a change shorter than `bounce` is none."""
-    starts, link = [begin], ""
-    acting = begin + np.flatnonzero(signal.acts[begin:end])
+def _changes(stamp: Times, signal: ForceSignal, begin: int, end: int) -> Iterator[int]:
+    """Rows of a contact in which it goes over to another link."""
+    link, acting = "", begin + np.flatnonzero(signal.acts[begin:end])
     for name, group in groupby(acting.tolist(), key=lambda row: str(signal.frame[row])):
         rows = list(group)
-        if stamp[rows[-1]] - stamp[rows[0]] < TOUCH.bounce:
-            continue
-        if link and name != link:
-            starts.append(rows[0])
-        link = name
-    return list(pairwise([*starts, end]))
-
-
-def cut_at(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:
-    """Rows of the parts of contacts between some stamps; none is shorter than `bounce`, if its contact is not."""
-    bounds = np.searchsorted(stamp, at).tolist()
-    parts: list[tuple[int, int]] = []
-    for begin, end in contacts:
-        start = begin
-        for bound in bounds:
-            if begin < bound < end and min(stamp[bound] - stamp[start], stamp[end - 1] - stamp[bound]) >= TOUCH.bounce:
-                parts.append((start, bound))
-                start = bound
-        parts.append((start, end))
-    return parts
+        if stamp[rows[-1]] - stamp[rows[0]] >= TOUCH.bounce:
+            if link and name != link:
+                yield rows[0]
+            link = name
 
 
 def _listed(
     traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep], begin: int, end: int, latency: float
 ) -> ListedContact:
+    """What was estimated in some rows, and what was true in those in which a contact was estimated."""
     true, estimated = traces.true, traces.estimated
     rows = begin + np.flatnonzero(estimated.acts[begin:end])
+    link = most(estimated.frame[rows])
+    own = rows[estimated.frame[rows] == link]
+    position, placed = median(estimated.position[own]), own[estimated.is_placed[own]]
+    reasons = certainty["reasons"][own]
+    bits = reasons[np.isfinite(reasons)].astype(np.int64)
     acting = rows[true.acts[rows]]
     touched = most(true.frame[acting]) if np.any(true.is_known[rows]) else ""
     there = acting[true.frame[acting] == touched]
     return ListedContact(
         *time_of(traces, steps, begin, end),
         _cut(estimated, begin, end),
-        estimate(traces, certainty, rows),
+        link,
+        len(own) / max(len(rows), 1),
+        median(certainty["probability"][own]),
+        position,
+        NAN if np.isnan(position) else median(certainty["position_sd"][own]),
+        bool(len(placed)),
+        median(estimated.size[own]),
+        median(certainty["force_sd"][own]),
+        float(np.sum(estimated.is_lower_bound[placed])) > TOUCH.lasting * len(placed),
+        tuple(text for why, text in REASONS.items() if np.sum(bits & why > 0) > TOUCH.lasting * len(bits)),
         touched,
         median(true.position[there]),
         median(true.size[there]),
         latency,
-    )
-
-
-def estimate(traces: Traces, certainty: Certainty, rows: Index) -> Estimate:
-    """What was estimated in some rows, in all of which a contact was."""
-    estimated = traces.estimated
-    link = most(estimated.frame[rows])
-    own = rows[estimated.frame[rows] == link]
-    reasons = certainty["reasons"][own]
-    bits = reasons[np.isfinite(reasons)].astype(np.int64)
-    lasting = {text: float(np.mean(bits & why > 0)) for why, text in REASONS.items()} if len(bits) else {}
-    probability, position_sd, force_sd = (
-        median(certainty[name][own]) for name in ("probability", "position_sd", "force_sd")
-    )
-    position = median(estimated.position[own])
-    placed = own[estimated.is_placed[own]]
-    return Estimate(
-        link,
-        len(own) / max(len(rows), 1),
-        probability,
-        position,
-        position_sd if not np.isnan(position) else NAN,
-        bool(len(placed)),
-        median(estimated.size[own]),
-        force_sd,
-        float(np.sum(estimated.is_lower_bound[placed])) > TOUCH.lasting * len(placed),
-        tuple(why for why, part in lasting.items() if part > TOUCH.lasting),
     )
 
 

@@ -27,10 +27,9 @@ def held_for(stamps: Times) -> int:
 
 def held_rows(stamps: Times, base: Times) -> tuple[Index, Mask]:
     """Row of the last message at or before each instant, and whether there is one and it is still held."""
-    row = np.searchsorted(stamps, base, side="right") - 1
-    known = row >= 0
-    row = np.maximum(row, 0)
-    return row, known & (base - stamps[row] <= held_for(stamps))
+    row = row_at(stamps, base)
+    age = base - stamps[row]
+    return row, (age >= 0) & (age <= held_for(stamps))
 
 
 def rows_before_gaps(stamps: Times) -> Index:

@@ -1,7 +1,6 @@
 """The arm and its controllers as they were when a bag was recorded, built from the parameters in the bag."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from wam_bag.bag import BagError
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -59,22 +58,18 @@ def prediction_parameters(recorded: RecordedParameters) -> PredictionParameters:
             notes[text.removeprefix(f"{recorded.source}: ")] = None  # the reader of a report knows the bag
             return None
 
+    driver = recorded.nodes.get("driver", {})  # one that simulates no amplifiers has none of these
+    ripples = (driver.get(f"amplifier.{name}", ()) for name in ("torque_ripple", "ripple_cycles"))
     return PredictionParameters(
         arm=part(Arm, "driver", "arm."),
         world=part(World, "driver", "world."),
         timing=part(Timing, "driver", "timing."),
         effects=part(Effects, "driver", "effects."),
-        commutation=_commutation(recorded.nodes.get("driver", {})),
+        commutation=tuple(zip(*ripples, strict=False)),
         force_loop=part(ForceLoopParameters, "force_loop"),
         servo=part(Servo, "velocity_loop", "servo."),
         note="; ".join(notes),
     )
-
-
-def _commutation(driver: Mapping[str, Any]) -> tuple[tuple[float, int], ...]:
-    """Of the recorded values of the driver; none of a driver that simulates no amplifiers."""
-    fractions, cycles = (driver.get(f"amplifier.{name}", ()) for name in ("torque_ripple", "ripple_cycles"))
-    return tuple(zip(fractions, cycles, strict=False))
 
 
 def recorded_arm(recorded: PredictionParameters) -> RecordedArm:

@@ -14,8 +14,6 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_sim.recorded_run import RecordedRun
 
-_Points = tuple[Times, Numbers]  # stamps, ns, and positions along a link, m, (k,)
-
 NAN = float("nan")
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
@@ -145,17 +143,17 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold] = ()) -> 
     tasks : forces that tasks command in it.
     """
 
-    def signal(wrench: str, points: _Points | None = None) -> ForceSignal:
+    def signal(wrench: str, point: str = "") -> ForceSignal:
         forces = run.wrench(wrench)
         position, is_placed = np.full(len(base), NAN), np.zeros(len(base), bool)
         if forces is None:
             return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), position, is_placed)
         row, known = held_rows(forces.stamp_ns, base)
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
-        if points is not None:
-            at, is_there = held_rows(points[0], base)
-            is_placed = is_there & known & (points[0][at] == forces.stamp_ns[row])
-            position[is_placed] = points[1][at[is_placed]]
+        if (placed := _positions(run, point)) is not None:
+            at, is_there = held_rows(placed[0], base)
+            is_placed = is_there & known & (placed[0][at] == forces.stamp_ns[row])
+            position[is_placed] = placed[1][at[is_placed]]
         return ForceSignal(np.array(forces.frames, np.str_)[row], force, position, is_placed)
 
     base = np.empty(0, np.int64)
@@ -164,9 +162,9 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold] = ()) -> 
             base = with_holes(columns.stamp_ns)
             break
     commanded, measured = signal("force_command"), signal("force_measured")
-    true = signal("sim/contact/wrench", _points(run, "sim/contact/point"))
+    true = signal("sim/contact/wrench", "sim/contact/point")
     true = true._replace(force=np.where(true.size[:, np.newaxis] < TOUCH.least_force, 0.0, true.force))
-    estimated = signal("contact/wrench", _points(run, "contact/point") or _points_of_hypotheses(run))
+    estimated = signal("contact/wrench", "contact/point")
     covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
     for task in tasks:
         rows = (base >= task.begin) & (base < task.end) & (task.axis < 0)
@@ -178,15 +176,13 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold] = ()) -> 
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
 
 
-def _points(run: RecordedRun, topic: str) -> _Points | None:
-    columns = run.points(topic)
-    return None if columns is None else (columns.stamp_ns, columns.point[:, 0])
-
-
-def _points_of_hypotheses(run: RecordedRun) -> _Points | None:
-    """Positions of the most probable hypotheses, which are those of `contact/point`."""
-    hypotheses = most_probable(run)
-    return None if hypotheses is None else (hypotheses[0], hypotheses[1]["position"])
+def _positions(run: RecordedRun, topic: str) -> tuple[Times, Numbers] | None:
+    """Stamps, ns, and positions along a link, m, of a topic, (k,); `contact/point` has those of the hypotheses."""
+    if (columns := run.points(topic)) is not None:
+        return columns.stamp_ns, columns.point[:, 0]
+    if topic == "contact/point" and (hypotheses := most_probable(run)) is not None:
+        return hypotheses[0], hypotheses[1]["position"]
+    return None
 
 
 def most_probable(run: RecordedRun) -> tuple[Times, dict[str, Numbers]] | None:

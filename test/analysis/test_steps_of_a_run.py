@@ -280,7 +280,7 @@ def thinned(columns: WrenchColumns, kept: Any) -> WrenchColumns:
 def test_without_contact_point_the_position_is_that_of_the_hypotheses_and_no_force_becomes_a_lower_bound():
     recording = Played()
     recording.without = ("contact/point",)
-    outer, inner, *_ = (one.estimate for one in recording.summary().contacts)
+    outer, inner, *_ = recording.summary().contacts
     assert (outer.is_lower_bound, outer.position) == (False, pytest.approx(0.30))
     assert inner.is_lower_bound
     assert verdict(recording.summary()) == verdict(Played().summary())
@@ -290,7 +290,7 @@ def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower
     recording = Played()
     recording.without = ("contact/point", "contact/hypotheses")
     summary = recording.summary()
-    assert not any(one.estimate.is_lower_bound for one in summary.contacts)
+    assert not any(one.is_lower_bound for one in summary.contacts)
     assert all(math.isnan(one.force_error) for one in summary.contacts)  # the force may be the least one
     section = section_of(recording.bag(), "contact")
     assert f"Positions of contacts: {NOT_PLACED}." in section.sentences
@@ -298,7 +298,7 @@ def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower
     assert {one.note for one in errors} == {"not known: the force may be a lower bound"}
     recording.without = ("contact/hypotheses",)  # with contact/point it is known
     outer, inner, *_ = recording.summary().contacts
-    assert (outer.force_error, inner.estimate.is_lower_bound) == (pytest.approx(-1.0), True)
+    assert (outer.force_error, inner.is_lower_bound) == (pytest.approx(-1.0), True)
     assert math.isnan(inner.force_error)
 
 
@@ -539,15 +539,14 @@ def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_th
     without_truth(recording)
     outer, inner, *pressed = recording.summary().contacts
     assert (outer.begin, outer.end, outer.step) == pytest.approx((0.72, 1.745, "push outer"))
-    found = outer.estimate
-    assert (found.link, found.probability, found.position, found.position_sd) == ("outer_link", 0.97, 0.30, 0.03)
-    assert (found.force, found.force_sd) == pytest.approx((11.0, 0.5))
-    assert (found.is_lower_bound, outer.true) == (False, "")
+    assert (outer.link, outer.probability, outer.position, outer.position_sd) == ("outer_link", 0.97, 0.30, 0.03)
+    assert (outer.force, outer.force_sd) == pytest.approx((11.0, 0.5))
+    assert (outer.is_lower_bound, outer.true) == (False, "")
     assert math.isnan(outer.position_error)
-    assert (inner.estimate.is_lower_bound, inner.estimate.reasons) == (True, (REASON,))
-    assert math.isnan(inner.estimate.position)
+    assert (inner.is_lower_bound, inner.reasons) == (True, (REASON,))
+    assert math.isnan(inner.position)
     assert [one.step for one in pressed] == ["press 8 N", "press 4 N", "lift"]
-    assert [one.estimate.force for one in pressed] == pytest.approx([7.84, 3.92, 3.0])
+    assert [one.force for one in pressed] == pytest.approx([7.84, 3.92, 3.0])
     shown = told(recording.bag())
     numbers = {one.name: one.measured for one in section_of(recording.bag(), "contact").findings}
     names = ("from", "probability of the link", "position along the link", "force")
@@ -590,13 +589,13 @@ def test_a_position_known_for_a_moment_is_not_that_of_the_whole_contact():
     recording.set(recording.estimated, 0.52, 1.55, "outer_link", (0.0, 11.0, 0.0))
     recording.set(recording.estimated, 0.52, 0.54, "outer_link", (0.0, 11.0, 0.0), 0.30)  # 2 % of it
     summary = recording.summary()
-    found = summary.contacts[0].estimate
+    found = summary.contacts[0]
     assert math.isnan(found.position)
     assert math.isnan(found.position_sd)
     assert found.is_lower_bound
     assert "position within 4 cm: YES (2.0 cm), not known for contact 1, 2" in verdict(summary)
     recording.set(recording.estimated, 0.52, 1.2, "outer_link", (0.0, 11.0, 0.0), 0.30)  # two thirds of it
-    assert recording.summary().contacts[0].estimate.position == pytest.approx(0.30)
+    assert recording.summary().contacts[0].position == pytest.approx(0.30)
 
 
 def test_a_contact_is_cut_where_the_estimate_was_lost():
@@ -674,9 +673,9 @@ def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another
     recording.set(recording.estimated, 1.0, 1.55, "inner_link", (0.0, 25.0, 0.0))
     recording.set(recording.estimated, 0.7, 0.75, "inner_link", (0.0, 5.0, 0.0))
     outer, inner, *_ = recording.summary().contacts
-    assert [outer.estimate.link, inner.estimate.link] == ["outer_link", "inner_link"]
+    assert [outer.link, inner.link] == ["outer_link", "inner_link"]
     assert (outer.begin, outer.end, inner.begin) == pytest.approx((0.72, 1.195, 1.2))
-    assert (outer.estimate.force, inner.estimate.force) == pytest.approx((11.0, 25.0))
+    assert (outer.force, inner.force) == pytest.approx((11.0, 25.0))
 
 
 @pytest.mark.slow

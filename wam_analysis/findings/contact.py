@@ -26,14 +26,14 @@ def contact_section(recording: AnalysedRecording) -> Section:
     named = [f"{number} ({one.step})" for number, one in enumerate(recording.contacts, 1) if one.step]
     sentences = [f"Contacts and their steps: {', '.join(named)}."] * bool(named)
     for number, contact in enumerate(recording.contacts, 1):
-        name = f"{number} {contact.estimate.link}{' false' * contact.is_false}"
+        name = f"{number} {contact.link}{' false' * contact.is_false}"
         declared = declared_position(recording, contact)
         findings += _numbers(name, contact, traces.period, declared)
         sentences += _doubts(name, contact)
         wrong += _contradicted(name, contact, declared, recording.parameters.force_loop)
-    if any(math.isnan(contact.estimate.probability) for contact in recording.contacts):
+    if any(math.isnan(contact.probability) for contact in recording.contacts):
         sentences.append(NOT_CERTAIN)
-    if not all(contact.estimate.is_placed for contact in recording.contacts):
+    if not all(contact.is_placed for contact in recording.contacts):
         sentences.append(f"Positions of contacts: {NOT_PLACED}.")
     sentences += [BLIND] * bool(np.any(recording.blind & traces.true.acts))
     sentences += wrong
@@ -76,7 +76,7 @@ def _middle(values: Numbers) -> float:
 
 def declared_position(recording: AnalysedRecording, contact: ListedContact) -> float:
     """Where the command or the parameters pin the force of a contact, m along its link; NaN where they do not."""
-    link, zero, loop = contact.estimate.link, recording.traces.zero, recording.parameters.force_loop
+    link, zero, loop = contact.link, recording.traces.zero, recording.parameters.force_loop
     for hold in recording.holds:
         middle = (0.5 * (hold.begin + hold.end) - zero) / 1e9
         if contact.begin <= middle < contact.end and link == (hold.cover or hold.frame):
@@ -89,8 +89,8 @@ def _contradicted(
     name: str, contact: ListedContact, declared: float, loop: ForceLoopParameters | None
 ) -> Iterator[str]:
     """That the true position, else the estimated one, is further from the declared one than their sd explain."""
-    cm, place, sd, how = 100.0, contact.estimate.position, contact.estimate.position_sd, "estimated"
-    if contact.true == contact.estimate.link and math.isfinite(contact.true_position):
+    cm, place, sd, how = 100.0, contact.position, contact.position_sd, "estimated"
+    if contact.true == contact.link and math.isfinite(contact.true_position):
         place, sd, how = contact.true_position, 0.0, "true"
     if abs(place - declared) > SHAFT.sigmas * math.hypot(sd, loop.contact_position_sd if loop else 0.0):
         at = f"{cm * place:.3g} +- {cm * sd:.2g}" if sd else f"{cm * place:.3g}"
@@ -102,14 +102,13 @@ def _numbers(name: str, contact: ListedContact, period: float, declared: float) 
     cm = 100.0
     yield Finding(f"{name}: from", "s", contact.begin)
     yield Finding(f"{name}: to", "s", contact.end)
-    one = contact.estimate
-    yield Finding(f"{name}: probability of the link", "%", 100.0 * one.probability)
-    yield Finding(f"{name}: position along the link", "cm", cm * one.position, error=cm * one.position_sd)
+    yield Finding(f"{name}: probability of the link", "%", 100.0 * contact.probability)
+    yield Finding(f"{name}: position along the link", "cm", cm * contact.position, error=cm * contact.position_sd)
     yield Finding(f"{name}: declared position", "cm", cm * declared)
-    least = "lower bound: the least force that explains the torques" * one.is_lower_bound
-    yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
+    least = "lower bound: the least force that explains the torques" * contact.is_lower_bound
+    yield Finding(f"{name}: force", "N", contact.force, math.nan, least, contact.force_sd, contact.is_lower_bound)
     yield Finding(f"{name}: error of the median position", "cm", cm * contact.position_error)
-    unknown = "not known: the force may be a lower bound" * (not one.is_placed)
+    unknown = "not known: the force may be a lower bound" * (not contact.is_placed)
     yield Finding(f"{name}: error of the median force", "N", contact.force_error, note=least or unknown)
     is_early = contact.latency <= 0.0
     note = f"time until its detection, to within {1e3 * period:.0f} ms" if not is_early else "reported before it began"
@@ -120,10 +119,10 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     """What is not to be trusted of a contact, and whether it was another one."""
     if cut := " and ".join(filter(None, contact.cut)):
         yield f"{name}: {cut}."
-    if contact.estimate.lasting < TOUCH.steady_link:
-        yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
-    yield from (f"{name}: {reason}." for reason in contact.estimate.reasons)
-    if contact.true not in ("", contact.estimate.link) and not contact.is_false:
+    if contact.lasting < TOUCH.steady_link:
+        yield f"{name}: this link was estimated for {contact.lasting:.0%} of the time, others for the rest."
+    yield from (f"{name}: {reason}." for reason in contact.reasons)
+    if contact.true not in ("", contact.link) and not contact.is_false:
         yield f"{name}: {contact.true} was touched."
 
 

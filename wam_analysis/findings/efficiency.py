@@ -17,7 +17,8 @@ from wam_description.transmission_map import TransmissionMap
 
 def efficiency_section(recording: AnalysedRecording) -> Section | None:
     """Efficiency of the transmission, where its losses are larger than the work that it stores."""
-    if (signals := recording.friction.with_losses) is None:
+    signals, _, _, unknown = recording.friction
+    if signals is None or unknown:
         return None
     motor = np.sum((signals.torque - signals.rotors) * signals.velocity, axis=1)
     at_links = signals.strain if np.any(np.isfinite(signals.strain)) else signals.cable_torque

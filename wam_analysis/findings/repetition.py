@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.foreign.sources import Piece, Source, longest, pieces
+from wam_analysis.foreign.sources import Piece, Source, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
@@ -87,7 +87,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     findings, begins = [], []
     varied: dict[str, tuple[float, str]] = {}  # the largest range of each unit, and whose it is
     for one, quantity, label in traced(recording.states):
-        if (piece := longest(pieces(one, quantity))) is None:
+        if (piece := max(pieces(one, quantity), key=lambda part: len(part.time), default=None)) is None:
             continue
         begins.append(CYCLE.first_line / float(np.ptp(piece.time)))
         unit = one.units[quantity]

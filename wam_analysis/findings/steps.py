@@ -192,10 +192,10 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
 def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     found = [(number, one) for number, one in enumerate(recording.contacts, 1) if not one.is_false]
-    errors = [100.0 * abs(one.position_error) for _, one in found if not one.estimate.is_lower_bound]
+    errors = [100.0 * abs(one.position_error) for _, one in found if not one.is_lower_bound]
     errors += [math.nan] * sum(one.lasts for one in recording.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
-    unknown = [str(number) for number, one in found if one.estimate.is_lower_bound]
+    unknown = [str(number) for number, one in found if one.is_lower_bound]
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{} cm")
     return answer._replace(remark=f"not known for contact {', '.join(unknown)}" * bool(unknown))
 

@@ -10,7 +10,7 @@ from wam_analysis.foreign.sources import Piece, Source, is_still, pieces, rests
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, with_sticks, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT
-from wam_bag.arrays import Mask, Numbers, Rows
+from wam_bag.arrays import Numbers
 
 
 def stick_section(recording: AnalysedRecording) -> Section:
@@ -139,15 +139,11 @@ def _still(piece: Piece, phases: Phases, least: float) -> Phases:
 def _only_turns(phases: Phases, velocity: Numbers) -> bool:
     """Whether it is one motion back and forth, which is slow for a moment where it turns."""
     between = phases.sticks[1:-1]
-    if len(phases.slips) < 4 or not len(between) or np.mean(_turns(between, velocity)) < SHAFT.turns:
+    goes_back = velocity[between[:, 0] - 1] * velocity[between[:, 1]] < 0.0  # not all turns of a motion are rests
+    if len(phases.slips) < 4 or not len(between) or np.mean(goes_back) < SHAFT.turns:
         return False
     rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
     return rest < SHAFT.brief * motion
-
-
-def _turns(sticks: Rows, velocity: Numbers) -> Mask:
-    """Whether the motion after each rest goes against the one before it; not all turns of a motion are rests."""
-    return velocity[sticks[:, 0] - 1] * velocity[sticks[:, 1]] < 0.0
 
 
 def rest_speed(piece: Piece, least: float) -> float:

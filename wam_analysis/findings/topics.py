@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Section, counted, shown, times
-from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
+from wam_analysis.foreign.sources import Source, Treated, clocks_of, pieces
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -96,22 +96,6 @@ def _lacks_velocity(one: Source) -> bool:
     return "position" in one.values and "velocity" not in one.values and not one.is_command
 
 
-DONE_TO = {
-    Treatment.ROUNDED: "the stamps are rounded to {size}; reception times are used",
-    Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are placed evenly between them",
-    Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
-    Treatment.RELAYED: "{number} of {of} messages repeat the one before at another interval, as by a relay; the others "
-    "are used",
-    Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
-    Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}; this is removed",
-    Treatment.HELD: "{quantity} only repeated in {number} of {of} messages; the others are used",
-    Treatment.UNFILLED: "the {quantity} is 0 in every message although the position moves; the rate of that is used",
-    Treatment.LATE: "the {quantity} is about {size}, as by a filter; the rate of the position is used",
-    Treatment.SCALED: "the {quantity} is {factor:.3g} times the rate of the position; that rate is used",
-    Treatment.SPARSE: "{quantity} in only {share} of {of} messages",
-}
-
-
 def _treated(found: Sequence[Source]) -> list[str]:
     """What was done to raw values, a sentence for all joints of a topic and quantities to which the same was done."""
     alike: dict[tuple[str, Treated], tuple[list[Source], list[str]]] = {}
@@ -124,7 +108,7 @@ def _treated(found: Sequence[Source]) -> list[str]:
     for (topic, treated), (those, quantities) in alike.items():
         is_whole = not quantities[0] or 1 < len(those) == sum(one.topic == topic for one in found)
         subject = topic if is_whole else ", ".join(one.label for one in those)
-        words = DONE_TO[treated.what].format(
+        words = treated.what.format(
             quantity=" and ".join(quantities),
             number=treated.number,
             of=treated.of,

@@ -77,7 +77,8 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
     if not np.any(np.isfinite(speed)):
         speed, _ = _of(run, "sim/joint_states", "velocity", joints, stamps)
     loads = {CABLE: cable, STRAIN: strain, GRAVITY: _of(run, "gravity_effort", "effort", joints, stamps)}
-    if _period(run) > SHAFT.slowest_period:
+    simulated = run.joints("sim/joint_states")
+    if simulated is not None and float(np.median(np.diff(simulated.stamp_ns))) / 1e9 > SHAFT.slowest_period:
         del loads[CABLE]
     load_from = next((name for name, (load, _) in loads.items() if np.any(np.isfinite(load))), "")
     if not load_from:
@@ -135,12 +136,6 @@ def _caveats(run: RecordedRun, left_out: float) -> Iterator[str]:
         )
 
 
-def _period(run: RecordedRun) -> float:
-    """Period of the simulator's joint states, s."""
-    columns = run.joints("sim/joint_states")
-    return float(np.median(np.diff(columns.stamp_ns))) / 1e9 if columns is not None else 0.0
-
-
 def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps: Times) -> tuple[Numbers, Mask]:
     """A field of another topic at some stamps, (k, n), interpolated, and where it was recorded, (k,).
 
@@ -173,11 +168,6 @@ class TransmissionFriction(NamedTuple):
     motors: Mapping[str, Friction] = MappingProxyType({})
     joints: Mapping[str, Friction] = MappingProxyType({})
     unknown: str = ""
-
-    @property
-    def with_losses(self) -> TransmissionSignals | None:
-        """The signals where they show the losses of the motors."""
-        return None if self.unknown else self.signals
 
 
 def transmission_friction(run: RecordedRun, parameters: PredictionParameters) -> TransmissionFriction:

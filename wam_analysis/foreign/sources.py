@@ -22,19 +22,20 @@ AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
 class Treatment(StrEnum):
-    """What was found in raw values, and done to them before the analysis."""
+    """What was found in raw values, and done to them before the analysis, in words."""
 
-    ROUNDED = "rounded stamps"  # times of reception were used
-    SPREAD = "coarse stamps, placed evenly"  # as are the times of reception: the messages were placed evenly
-    TWICE = "messages that came twice"  # the second was left out
-    RELAYED = "messages that came again with other stamps"  # were left out
-    WRAPPED = "wraps of the angle"  # were unwrapped
-    MOVED_ZERO = "jumps of the zero"  # were taken off
-    HELD = "values held over"  # from the message before: were left out
-    UNFILLED = "zeros"  # although the joint moves: were left out
-    LATE = "a filtered velocity"  # was left out
-    SCALED = "a velocity of another scale"  # was left out
-    SPARSE = "messages without"  # the others were used
+    ROUNDED = "the stamps are rounded to {size}; reception times are used"
+    # the times of reception are coarse, too
+    SPREAD = "{number} of {of} stamps repeat the one before; the messages are placed evenly between them"
+    TWICE = "{number} of {of} stamps came twice; the first message of each is used"
+    RELAYED = "{number} of {of} messages repeat the one before at another interval, as by a relay; the others are used"
+    WRAPPED = "the {quantity} jumps {times} by {size}; it is unwrapped"
+    MOVED_ZERO = "the zero of the {quantity} moves {times}, by up to {size}; this is removed"
+    HELD = "{quantity} only repeated in {number} of {of} messages; the others are used"
+    UNFILLED = "the {quantity} is 0 in every message although the position moves; the rate of that is used"
+    LATE = "the {quantity} is about {size}, as by a filter; the rate of the position is used"
+    SCALED = "the {quantity} is {factor:.3g} times the rate of the position; that rate is used"
+    SPARSE = "{quantity} in only {share} of {of} messages"
 
 
 class Treated(NamedTuple):
@@ -495,11 +496,6 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
             values["velocity"], sd["velocity"] = differentiated(time, values["position"])
         found.append(Piece(time, values, sd, stamps, recorded))
     return found
-
-
-def longest(some: list[Piece]) -> Piece | None:
-    """The longest of the pieces."""
-    return max(some, key=lambda piece: len(piece.time), default=None)
 
 
 def resolution(value: Numbers) -> float:

@@ -304,12 +304,7 @@ def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, al
         is_stuck = np.all(allowed[first:last]) and np.all(np.abs(velocity[first:last]) <= rest)
         if int(end) in begins and last - first >= 4 and is_stuck:
             step = float(np.max(np.abs(np.diff(torque[last - 3 : last]))))
-            found.append((begins[int(end)] * _end_of_line(torque[first:last]), step, last - 1))
+            line = np.polynomial.polynomial.polyfit(np.arange(first, last) + 1.0 - last, torque[first:last], 1)
+            found.append((begins[int(end)] * float(line[0]), step, last - 1))
     torques, steps, rows = np.array(found, dtype=np.float64).reshape(-1, 3).T
     return _Breakaways(torques, steps, rows.astype(np.int64))
-
-
-def _end_of_line(values: Numbers) -> float:
-    """Last value of a line through the values."""
-    steps = np.arange(len(values)) + 1.0 - len(values)
-    return float(np.polynomial.polynomial.polyfit(steps, values, 1)[0])

@@ -139,7 +139,7 @@ def pushed(runs: Runs) -> Result:
     found = next((one for one in analysed.contacts if one.true == push.link), None)
     if found is None:
         raise BagError(f"{run.bag.path}: the push on {push.link} was not detected")
-    force, place = (found.true_force, found.estimate.force), (found.true_position, found.estimate.position)
+    force, place = (found.true_force, found.force), (found.true_position, found.position)
     rows = [
         below("false detections", analysed.traces.false_seconds, "s", BOUNDS.latency, "chapter 2"),
         below("detection latency", found.latency, "s", BOUNDS.latency, "chapter 2"),
