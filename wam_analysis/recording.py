@@ -134,13 +134,6 @@ class AnalysedRecording:
             return "" if self.run.outcome in ("", Code.DONE) else self.run.outcome
         return self.run.faults[-1].reason if self.run.faults else UNFINISHED * bool(self.run.steps)
 
-    @property
-    def faults(self) -> list[str]:
-        """What the driver stopped for, a sentence each."""
-        zero = self.traces.zero
-        texts = [f"driver fault at {(one.stamp - zero) / 1e9:.2f} s: {one.reason}" for one in self.run.faults]
-        return list(dict.fromkeys(texts))
-
     @cached_property
     def loop(self) -> list[dict[str, str]]:
         """What the driver reported of its loop every second."""

@@ -241,12 +241,9 @@ def mode_of(metadata: Mapping[str, Mapping[str, str]], parameters: bytes | None)
     if recorded is not None or parameters is None:
         return recorded or "unknown"
     try:
-        modes = {_timing_mode(node["ros__parameters"]) for node in safe_yaml.load(parameters).values()}
+        nodes = [node["ros__parameters"] for node in safe_yaml.load(parameters).values()]
+        modes = {node.get("timing", {}).get("mode", node.get("timing.mode")) for node in nodes}
     except (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError):
         return "unknown"
     known = sorted(str(mode) for mode in modes - {None})
     return known[0] if len(known) == 1 else "unknown"
-
-
-def _timing_mode(parameters: Mapping[str, Any]) -> Any:
-    return parameters.get("timing", {}).get("mode", parameters.get("timing.mode"))

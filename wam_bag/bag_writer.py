@@ -49,22 +49,6 @@ class Split(NamedTuple):
 WHOLE: Final = Split(0, 0.0)  # one file
 
 
-class Packing(NamedTuple):
-    """How messages are packed.
-
-    Attributes
-    ----------
-    chunk_size : bytes of a chunk.
-    level : of its compression, 1 to 22.
-    """
-
-    chunk_size: int = CHUNK_SIZE
-    level: int = FAST
-
-
-LIVE: Final = Packing()
-
-
 class BagWriter:
     """Writes a new bag directory ``<path>/`` with ``<name>_0.mcap`` and so on and, on closing, ``metadata.yaml``.
 
@@ -75,7 +59,8 @@ class BagWriter:
     ----------
     path : directory of the bag; refused if it exists.  Missing parents are created.
     split : when it continues in another file.
-    packing : of the messages.
+    chunk_size : bytes of a chunk.
+    level : of its compression, 1 to 22.
 
     Attributes
     ----------
@@ -87,10 +72,10 @@ class BagWriter:
         if the bag cannot be created, before anything is recorded.
     """
 
-    def __init__(self, path: Path, split: Split = WHOLE, packing: Packing = LIVE) -> None:
+    def __init__(self, path: Path, split: Split = WHOLE, chunk_size: int = CHUNK_SIZE, level: int = FAST) -> None:
         self.path = path
         self.closed = False
-        self._packing = packing
+        self._packing = chunk_size, level
         self._largest = split.size or math.inf  # bytes of a file
         self._longest = round(split.seconds * 1e9) or math.inf  # ns in a file
         self._files: list[FileSummary] = []
@@ -156,7 +141,10 @@ class BagWriter:
             self._file_begin = log_time
         try:  # not the context manager, which would take as long as all the rest
             if self._writer.position >= self._largest or log_time - self._file_begin >= self._longest:
-                self._next_file(log_time)
+                self._writer.flush()
+                self._finish_file()
+                self._file_begin = log_time
+                self._open()
             self._writer.add(channel, log_time, publish_time, sequence, data)
         except OSError as error:
             self._give_up(error)
@@ -229,7 +217,7 @@ class BagWriter:
         path = self.path / self._file_name()
         stream = path.open("xb", buffering=0)
         try:
-            self._writer = McapWriter(stream, LIBRARY, self._packing.chunk_size, self._packing.level)
+            self._writer = McapWriter(stream, LIBRARY, *self._packing)
         except OSError:
             stream.close()
             path.unlink()
@@ -249,12 +237,6 @@ class BagWriter:
         channel = self._channels.setdefault(topic["name"], len(self._channels) + 1)
         self._writer.define(Schema(number, schema(kind), "ros2msg", kind))
         self._writer.define(Channel(channel, topic["name"], "cdr", metadata, number))
-
-    def _next_file(self, log_time: int) -> None:
-        self._writer.flush()
-        self._finish_file()
-        self._file_begin = log_time
-        self._open()
 
     def _finish_file(self) -> None:
         writer = self._writer

@@ -338,7 +338,8 @@ def stamp_reader(name: str) -> Callable[[bytes], int | None]:
     if first.type in _STAMPS and first.length is None:
         return first_stamp
     if first.length == 0 and "/" in first.type and definition(first.type)[0].type in _STAMPS:
-        return _element_stamp
+        element = ENCAPSULATION + 4  # behind the count
+        return lambda data: first_stamp(data, element) if any(data[ENCAPSULATION:element]) else None
     return lambda data: None
 
 
@@ -348,11 +349,6 @@ def first_stamp(data: bytes, at: int = ENCAPSULATION) -> int | None:
         return None
     sec, nanosec = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, at)
     return int(sec) * SECOND + int(nanosec)
-
-
-def _element_stamp(data: bytes) -> int | None:
-    first = ENCAPSULATION + 4  # behind the count
-    return first_stamp(data, first) if any(data[ENCAPSULATION:first]) else None
 
 
 class ExactLength:

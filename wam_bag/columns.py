@@ -6,7 +6,6 @@ of them, and a column is a view of many records at once.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
@@ -105,6 +104,8 @@ class Messages(NamedTuple):
 
 
 Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | Messages
+Extract = Callable[[Group], tuple[Any, ...]]
+Assemble = Callable[[Times, list[Any]], Columns]
 
 
 def series(columns: Columns) -> Series:
@@ -181,11 +182,6 @@ class Collector:
             raise BagError(f"{label}: {error}; read the others of its topics") from None
 
 
-def _joints(group: Group) -> tuple[Any, ...]:
-    fields = [group.numbers(name).astype(np.float64) for name in JOINT_FIELDS]
-    return *_header(group), group.text("name"), fields
-
-
 def _header(group: Group) -> tuple[Times, str]:
     return group.time("header.stamp"), group.text("header.frame_id")[0]
 
@@ -205,10 +201,14 @@ def _filled(groups: list[Any], place: int, shape: tuple[int, ...], dtype: Any) -
     return column
 
 
-def _assembled(kind: Any, shapes: Sequence[tuple[int, ...]], times: Times, groups: list[Any]) -> Any:
-    """Columns of stamps, frames and arrays, which have this shape in each message."""
-    arrays = (_filled(groups, i, (len(times), *shape), np.float64) for i, shape in enumerate(shapes, 2))
-    return kind(*_stamped(times, groups), *arrays)
+def _vectors(kind: Any, *paths: str) -> tuple[Extract, Assemble]:
+    """How columns of stamps, frames and vectors are made, those at some paths in the messages."""
+
+    def assemble(times: Times, groups: list[Any]) -> Columns:
+        arrays = (_filled(groups, i, (len(times), 3), np.float64) for i, _ in enumerate(paths, 2))
+        return kind(*_stamped(times, groups), *arrays)
+
+    return lambda group: (*_header(group), *map(group.vector, paths)), assemble
 
 
 def _stamped(times: Times, groups: list[Any]) -> tuple[Times, Times, Texts]:
@@ -280,18 +280,13 @@ def _table_columns(times: Times, groups: list[Any]) -> TableColumns:
     return TableColumns(*_stamped(times, groups), *table_columns(found))
 
 
-Extract = Callable[[Group], tuple[Any, ...]]
-Assemble = Callable[[Times, list[Any]], Columns]
 _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
-    "sensor_msgs/msg/JointState": (_joints, joint_columns),
-    "geometry_msgs/msg/WrenchStamped": (
-        lambda group: (*_header(group), group.vector("wrench.force"), group.vector("wrench.torque")),
-        partial(_assembled, WrenchColumns, ((3,), (3,))),
+    "sensor_msgs/msg/JointState": (
+        lambda group: (*_header(group), group.text("name"), list(map(group.numbers, JOINT_FIELDS))),
+        joint_columns,
     ),
-    "geometry_msgs/msg/PointStamped": (
-        lambda group: (*_header(group), group.vector("point")),
-        partial(_assembled, PointColumns, ((3,),)),
-    ),
+    "geometry_msgs/msg/WrenchStamped": _vectors(WrenchColumns, "wrench.force", "wrench.torque"),
+    "geometry_msgs/msg/PointStamped": _vectors(PointColumns, "point"),
     "sensor_msgs/msg/PointCloud2": (lambda group: (*_header(group), tables(group)), _table_columns),
     "std_msgs/msg/Bool": (
         lambda group: (group.numbers("data")[:, 0] != 0,),

@@ -29,11 +29,6 @@ class Repaired(NamedTuple):
     first: int
     losses: FileLosses | None
 
-    @property
-    def was_whole(self) -> bool:
-        """Whether nothing had to be repaired."""
-        return self.losses is None
-
 
 def repair(path: Path) -> list[Repaired]:
     """Repair a bag: each broken file is written again, then metadata.yaml if it does not fit.
@@ -65,7 +60,7 @@ def repair(path: Path) -> list[Repaired]:
         else:
             done.append(_repair_file(file))
     names = [result.name for result in done]
-    if not all(result.was_whole for result in done) or not _is_listed(path, names):
+    if any(result.losses for result in done) or not _is_listed(path, names):
         write_metadata(path, _information([path / name for name in names]))
     return done
 

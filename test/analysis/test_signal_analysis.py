@@ -9,8 +9,8 @@ from wam_analysis.findings.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle
-from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.measures.response import step_response
+from wam_analysis.measures.runs import missed, usual_steps
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
@@ -313,9 +313,9 @@ def test_late_messages_are_not_counted_as_missing(jitter, lost):
     kept = np.append(draws.random(3999) >= lost, True)
     stamp = np.rint(1e7 * (np.arange(4000) + jitter * draws.uniform(-1.0, 1.0, 4000))[kept]).astype(np.int64)
     inner = np.diff(np.flatnonzero(kept)) - 1
-    assert stamp_timing(stamp, None).missed == inner.sum()
+    assert missed(stamp, usual_steps(np.diff(stamp))) == inner.sum()
     slower = np.append(stamp, stamp[-1] + 60_000_000 * np.arange(1, 400))
-    assert 0.95 * inner.sum() <= stamp_timing(slower, None).missed <= inner.sum()
+    assert 0.95 * inner.sum() <= missed(slower, usual_steps(np.diff(slower))) <= inner.sum()
 
 
 # swings

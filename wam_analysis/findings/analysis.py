@@ -210,13 +210,15 @@ def _foreign_line(recording: AnalysedRecording) -> str:
 
 def happened_section(recording: AnalysedRecording) -> Section:
     """What happened, in a few sentences."""
-    run, faults = recording.run, recording.faults
+    run, zero = recording.run, recording.traces.zero
+    faults = [f"driver fault at {(one.stamp - zero) / 1e9:.2f} s: {one.reason}" for one in run.faults]
+    faults = list(dict.fromkeys(faults))
     wrong = [stated(run.others)] if run.others else []
     wrong += [f"INCOMPLETE: {line}" for line in recording.lost]
     wrong += [f"REFUSED: {one.sentence}." for one in run.refused]
     wrong += [f"STOPPED: {fault}." for fault in faults[:1]]
     wrong += [stated(recording.failure)] if recording.failure and not faults else []
-    sentences = [*wrong, *map(stated, faults[1:]), *_changed(run, recording.traces.zero)]
+    sentences = [*wrong, *map(stated, faults[1:]), *_changed(run, zero)]
     if recording.parameters.note:
         sentences.append(f"Some numbers have no prediction: {recording.parameters.note}.")
     lacking = run.lacking("joint_states", "force_command", "contact/wrench", "status")

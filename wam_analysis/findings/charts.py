@@ -13,7 +13,7 @@ from wam_analysis.findings.repetition import held as held_command
 from wam_analysis.foreign.sources import Source
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, STREAM
-from wam_analysis.traces import ForceSignal
+from wam_analysis.traces import Traces
 from wam_bag.arrays import Numbers
 
 FORCES = {**COLOURS, "at least": LIKELY}
@@ -53,17 +53,14 @@ class Chart(NamedTuple):
 
 def charts(analysis: Analysis) -> Iterator[Chart]:
     """Every chart for which the recording has data; those of `FIRST` fill a screen at most."""
-    over_time = list(_over_time(analysis))
-    for i, chart in enumerate(over_time):
-        yield chart._replace(section=FIRST if i < LAYOUT.first_charts else SIGNALS)
-    yield from map(_thinned, _positions(analysis))
+    for i, chart in enumerate(_over_time(analysis.recording)):
+        yield _thinned(chart._replace(section=FIRST if i < LAYOUT.first_charts else SIGNALS))
+    yield from map(_thinned, _positions(analysis.recording.traces))
 
 
-def _over_time(analysis: Analysis) -> Iterator[Chart]:
+def _over_time(recording: AnalysedRecording) -> Iterator[Chart]:
     """Forces and motions, each with what was commanded."""
-    recording = analysis.recording
-    if (forces := _forces_over_time(recording)) is not None:
-        yield _thinned(forces)
+    yield from _forces_over_time(recording.traces)
     for one in _shown(recording):
         quantities = [q for q in one.values if not q.startswith("torque")][: 1 if one.is_joint else 3]
         if not quantities:
@@ -74,7 +71,7 @@ def _over_time(analysis: Analysis) -> Iterator[Chart]:
             held = [(q, held_command(command, q, one.time)) for q in quantities if q in command.values]
             lines += [ChartLine(f"{q} commanded", COMMANDED, value, True) for q, value in held]
         up = f"{quantities[0] if one.is_joint else 'force'} [{one.units[quantities[0]]}]"
-        yield _thinned(Chart(SIGNALS, f"{one.label} over time.", TIME, up, one.time, tuple(lines), one.topic))
+        yield Chart(SIGNALS, f"{one.label} over time.", TIME, up, one.time, tuple(lines), one.topic)
 
 
 def _shown(recording: AnalysedRecording) -> list[Source]:
@@ -93,27 +90,23 @@ def _extent(one: Source) -> float:
     return float(known.max(initial=-np.inf) - known.min(initial=np.inf))
 
 
-def _forces_over_time(recording: AnalysedRecording) -> Chart | None:
-    """The size of each force that was recorded; None if there is none but the commanded one."""
-    traces, found = recording.traces, dict[str, Numbers]()
-    for name in ("commanded", "true", "measured", "estimated"):
-        signal: ForceSignal = getattr(traces, name)
-        if np.any(signal.acts):
-            found[name] = signal.size
+def _forces_over_time(traces: Traces) -> Iterator[Chart]:
+    """The size of each force that was recorded; none if there is nothing to compare the commanded one with."""
+    signals = {name: getattr(traces, name) for name in COLOURS}
+    found = {name: signal.size for name, signal in signals.items() if np.any(signal.acts)}
     if not found.keys() - {"commanded"}:
-        return None  # nothing to compare the command with
+        return
     if np.any(bound := traces.estimated.is_lower_bound):
         found |= {"at least": np.where(bound, found["estimated"], np.nan)}
         found["estimated"] = np.where(bound, np.nan, found["estimated"])
     rising = np.concatenate(([True], np.diff(traces.stamp) > 0))
     lines = (ChartLine(name, FORCES[name], value[rising], name == "commanded") for name, value in found.items())
     time = (traces.stamp - traces.stamp[0])[rising] / 1e9
-    return Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time")
+    yield Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time")
 
 
-def _positions(analysis: Analysis) -> Iterator[Chart]:
+def _positions(traces: Traces) -> Iterator[Chart]:
     """Where the arm was touched."""
-    traces = analysis.recording.traces
     touched = {name: getattr(traces, name) for name in ("true", "estimated")}
     positions = {name: np.where(one.acts, 100.0 * one.position, np.nan) for name, one in touched.items()}
     lines = [ChartLine(name, COLOURS[name], position) for name, position in positions.items()]

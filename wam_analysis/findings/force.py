@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.held_force import HeldForce, Theory
-from wam_analysis.findings.prediction import LargestForce, Predicted
+from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.held_messages import step_at
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
@@ -195,7 +195,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         sentences += [sentence for sentence in found if sentence not in sentences]
         if fate is not Verdict.SETTLED:
             (wrong if fate is Verdict.DIVERGED else verdict).append(text)
-        findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory)]
+        findings += _cycle_findings(one, theory)
     if not recording.held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
@@ -243,8 +243,8 @@ def _words(seen: Swings) -> str:
     }[seen.verdict]
 
 
-def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> Iterator[Finding]:
-    name, cycle, seen = one.hold.name, one.cycle, one.swinging
+def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
+    name, cycle, seen, predicted = one.hold.name, one.cycle, one.swinging, theory.predicted
     size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence)
     if not sure >= CYCLE.sure:
         size = time = sure = math.nan
@@ -255,14 +255,10 @@ def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> Iterator[Fin
     if seen is not None and seen.shaft and seen.swings.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
         yield Finding(f"{name}: swing of {seen.shaft}, peak to peak", "rad", seen.swings.peak_to_peak)
         yield Finding(f"{name}: period of the swing", "s", seen.swings.period)
-
-
-def _theory_findings(name: str, theory: Theory) -> Iterator[Finding]:
-    """Predictions for the loop itself."""
     if theory.guarded is not None:
         guard, surface = theory.guarded.assessment, shown(theory.guarded.surface, "N/m")
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
         yield Finding(f"{name}: gain margin (at most {GUARD.largest_scale:g} tried)", "", math.nan, guard.scale, note)
-    if theory.predicted is not None and (size := theory.predicted.actuator_peak_to_peak) > 0.0:
+    if predicted is not None and (size := predicted.actuator_peak_to_peak) > 0.0:
         label = f"{name}: cycle of the motors at the contact, peak to peak"
         yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")

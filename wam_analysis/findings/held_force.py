@@ -27,7 +27,6 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT, TOUCH
 from wam_analysis.traces import Traces
 from wam_bag.arrays import Mask, Numbers
-from wam_bag.bag import JointColumns
 from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
@@ -251,34 +250,18 @@ def _swinging(run: RecordedRun, hold: Hold, time: Numbers, force: Numbers) -> Sw
     if len(force):
         band = max(HOLD.loud * hold.commanded, 4.0 * noise(force))
         return Swinging("", swings(time, hold.commanded - force, 2.0 * band, band))
-    found = []
+    found: list[Swinging] = []
     for topic in ("motor_states", "joint_sensors", "joint_states"):
-        columns = run.joints(topic)
-        if columns is None or not columns.position.shape[1]:
+        if (columns := run.joints(topic)) is None or found:
             continue
-        for i, name in enumerate(columns.names):
-            one = _swings(columns, i, hold)
-            if one is not None:
-                found.append(Swinging(name, one))
-        if found:
-            break
+        rows = slice(*np.searchsorted(columns.stamp_ns, [hold.begin, hold.end]))
+        for name, value in zip(columns.names, columns.position[rows].T, strict=False):
+            extent = float(np.ptp(late)) if len(late := value[int((1.0 - CYCLE.late_part) * len(value)) :]) else 0.0
+            if len(value) >= SHAFT.fewest_samples and np.all(np.isfinite(value)) and extent >= CYCLE.still_shaft:
+                least = max(CYCLE.least_swing * extent, CYCLE.loud_swing * noise(value))
+                found.append(Swinging(name, swings((columns.stamp_ns[rows] - hold.begin) / 1e9, value, least)))
     order = (Verdict.DIVERGED, Verdict.LIMIT_CYCLE, Verdict.SETTLED, Verdict.UNDECIDED)
     return min(found, key=lambda one: (order.index(one.swings.verdict), -one.swings.number), default=None)
-
-
-def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
-    a, b = (int(row) for row in np.searchsorted(columns.stamp_ns, [hold.begin, hold.end]))
-    value = columns.position[a:b, i]
-    if len(value) < SHAFT.fewest_samples or not np.all(np.isfinite(value)):
-        return None
-    extent = float(np.ptp(value[int((1.0 - CYCLE.late_part) * len(value)) :]))
-    if extent < CYCLE.still_shaft:
-        return None
-    return swings(
-        (columns.stamp_ns[a:b] - hold.begin) / 1e9,
-        value,
-        max(CYCLE.least_swing * extent, CYCLE.loud_swing * noise(value)),
-    )
 
 
 class Theory(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from wam_analysis.contact_list import median
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Source
-from wam_analysis.measures.loop_timing import stamp_timing
+from wam_analysis.measures.runs import missed, usual_steps
 from wam_analysis.recording import RATE, STAMPED, AnalysedRecording
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Times
@@ -56,25 +56,28 @@ def timing_section(recording: AnalysedRecording) -> Section:
     findings, wrong = [], []
     streams = _foreign_streams(recording) if recording.is_foreign else _own_streams(recording)
     for name, stamp, received, expected in streams:
-        found = stamp_timing(stamp, received)
+        times = np.unique(stamp)
+        steps = np.diff(times)
+        periods = usual_steps(steps.astype(np.float64)) if len(steps) else np.full(1, math.nan)
+        period, slowest = float(np.median(steps)) / 1e9 if len(steps) else math.nan, float(np.max(periods)) / 1e9
+        lost, gap, backwards = missed(times, periods), float(np.max(np.diff(stamp))) / 1e9, np.sum(np.diff(stamp) <= 0)
         findings += [
-            Finding(f"{name}: period", "ms", 1e3 * found.period, 1e3 * expected),
-            Finding(f"{name}: missed periods", "", float(found.missed)),
-            Finding(f"{name}: longest gap between stamps", "s", found.longest_gap),
+            Finding(f"{name}: period", "ms", 1e3 * period, 1e3 * expected),
+            Finding(f"{name}: missed periods", "", float(lost)),
+            Finding(f"{name}: longest gap between stamps", "s", gap),
         ]
-        if found.backwards:
-            findings.append(Finding(f"{name}: stamps that do not increase", "", float(found.backwards)))
+        if backwards:
+            findings.append(Finding(f"{name}: stamps that do not increase", "", float(backwards)))
         if received is not None:
+            waits = np.diff(np.sort(received).astype(np.float64)) / 1e9
             findings += [
-                Finding(f"{name}: reception jitter", "ms", 1e3 * found.jitter, note="standard deviation"),
-                Finding(f"{name}: longest gap between receptions", "s", found.worst),
+                Finding(f"{name}: reception jitter", "ms", 1e3 * float(np.std(waits)), note="standard deviation"),
+                Finding(f"{name}: longest gap between receptions", "s", float(np.max(waits))),
             ]
-        if found.slowest > STREAM.changes * found.period:
-            longer = shown(found.slowest, "s")
-            wrong.append(f"{name}: the period changes, from {shown(found.period, 's')} to {longer}.")
-        if found.missed:
-            gap = shown(found.longest_gap, "s")
-            wrong.append(f"{name}: {found.missed} messages missing; longest gap: {gap}.")
+        if slowest > STREAM.changes * period:
+            wrong.append(f"{name}: the period changes, from {shown(period, 's')} to {shown(slowest, 's')}.")
+        if lost:
+            wrong.append(f"{name}: {lost} messages missing; longest gap: {shown(gap, 's')}.")
     if recording.is_foreign:
         stated = "No message is missing." if findings else "No stamped topic was recorded."
         return Section("timing", "Timing", wrong or [stated], findings, wrong=wrong)

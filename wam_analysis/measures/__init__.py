@@ -7,6 +7,5 @@ lines               lines in the spectrum, above the noise
 swings              whether a motion settles, cycles or diverges
 stick_slip_phases   phases of rest and of motion
 friction            static, dynamic and viscous friction
-loop_timing         periods and jitter from stamps
-runs                intervals of a condition, noise, smoothing
+runs                intervals of a condition, missing messages, noise, smoothing
 """

@@ -1,10 +1,10 @@
-"""Intervals in which a condition holds, and the noise of a signal."""
+"""Intervals in which a condition holds, usual and missing times, and the noise of a signal."""
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.thresholds import STREAM
-from wam_bag.arrays import Mask, Numbers, Rows
+from wam_bag.arrays import Mask, Numbers, Rows, Times
 
 
 def after_gaps(time: Numbers | Rows) -> Mask:
@@ -35,6 +35,23 @@ def usual_steps(steps: Numbers) -> Numbers:
     near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
     slowest = np.max(sliding_window_view(near, 3), axis=1)
     return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
+
+
+def missed(times: Times, periods: Numbers) -> int:
+    """Messages that are missing among rising times: what came late is near the time that it left out.
+
+    Parameters
+    ----------
+    times : (n,), ns.
+    periods : (n - 1,), the usual steps about each, see `usual_steps`.
+    """
+    steps = np.diff(times)
+    rows = np.flatnonzero(steps > STREAM.changes * periods)
+    long, period = steps[rows], periods[rows]
+    first = np.searchsorted(times, times[rows] - long)
+    last = np.searchsorted(times, times[rows + 1] + long, side="right") - 1
+    there = (times[last] - times[first]) / period - (last - first)
+    return int(np.sum(np.clip(np.rint(there), 0, np.rint(long / period) - 1)))
 
 
 def runs(mask: Mask) -> Rows:

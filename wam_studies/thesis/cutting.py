@@ -8,13 +8,13 @@ from mcap.reader import make_reader
 from mcap.records import Message
 
 from wam_bag.bag_file import files, is_selected
-from wam_bag.bag_writer import BagWriter, Packing
+from wam_bag.bag_writer import WHOLE, BagWriter
 from wam_bag.errors import BagError, command
 from wam_bag.losses import CUT
 from wam_bag.metadata import profiles
 from wam_studies.thesis.definition import SampleDefinition
 
-PACKING: Final = Packing(4 * 2**20, 19)  # the strongest level that needs no more memory to read
+PACKING: Final = (4 * 2**20, 19)  # the strongest level that needs no more memory to read
 OWN: Final = "rosbag2"  # metadata record that describes the file it is in, and so is written again
 
 
@@ -63,7 +63,7 @@ def cut(source: Path, target: Path, sample: SampleDefinition) -> None:
     metadata[CUT] = {"begin_ns": str(begin), "end_ns": str(end), "topics": " ".join(sample.topics or "*")}
     if sample.thinned:
         metadata[CUT]["thinned"] = " ".join(f"{name}:{each}" for name, each in sample.thinned.items())
-    with BagWriter(target, packing=PACKING) as bag:
+    with BagWriter(target, WHOLE, *PACKING) as bag:
         kept = []
         for topic in sorted(topics):  # a source may have its topics in any order
             bag.add_topic(topic, *topics[topic])
