@@ -10,8 +10,7 @@ from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle
 from wam_analysis.measures.response import step_response
-from wam_analysis.measures.runs import missed, usual_steps
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
+from wam_analysis.measures.runs import at_rest, missed, runs, usual_steps, without_turns
 from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 from wam_theory.verdicts import Verdict
@@ -148,11 +147,9 @@ def test_what_does_not_repeat_is_no_cycle(value):
 def test_sticks_and_slips_are_told_apart_and_chatter_is_bridged():
     velocity = np.concatenate([np.zeros(300), 0.4 * np.ones(100), np.zeros(200), -0.4 * np.ones(50), np.zeros(350)])
     velocity[150] = 0.3  # one bad sample is no slip
-    found = stick_slip_phases(velocity + draws(6, 1000, 0.002), rest=0.02, shortest=10)
-    assert found.sticks.tolist() == [[0, 300], [400, 600], [650, 1000]]
-    assert found.slips.tolist() == [[300, 400], [600, 650]]
-    assert found.directions.tolist() == [1.0, -1.0]
-    assert found.stuck == 0.85
+    found = at_rest(velocity + draws(6, 1000, 0.002), rest=0.02, shortest=10)
+    assert runs(found).tolist() == [[0, 300], [400, 600], [650, 1000]]
+    assert runs(~found).tolist() == [[300, 400], [600, 650]]
 
 
 @pytest.mark.parametrize("peak", [0.06, 0.08, 0.2])
@@ -164,12 +161,12 @@ def test_a_slow_sine_turns_and_does_not_slip_and_one_with_stiction_does(peak: fl
     slips = []
     for velocity in (sine, stuck):
         noisy = velocity + draws(11, len(time), noise)
-        found = stick_slip_phases(noisy, rest=0.05, shortest=10)
-        assert len(found.slips) >= 12
-        slips.append(without_turns(found, noisy, 0.05))
-    assert len(slips[0].slips) == 1
-    assert slips[0].stuck < 0.05
-    assert len(slips[1].slips) >= 12
+        found = at_rest(noisy, rest=0.05, shortest=10)
+        assert len(runs(~found)) >= 12
+        slips.append(~without_turns(found, noisy, 0.05))
+    assert len(runs(slips[0])) == 1
+    assert np.mean(slips[0]) > 0.95
+    assert len(runs(slips[1])) >= 12
 
 
 # friction

@@ -7,10 +7,10 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.foreign.sources import Piece, Source, is_still, pieces, rests
-from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, with_sticks, without_turns
+from wam_analysis.measures.runs import at_rest, runs, with_alone, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT
-from wam_bag.arrays import Numbers
+from wam_bag.arrays import Mask, Numbers, Rows
 
 
 def stick_section(recording: AnalysedRecording) -> Section:
@@ -87,38 +87,34 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     """Rest and motion of a joint, which is at rest below a least speed; None without a velocity."""
     if rests(source):
         return Sticking(1.0, 0, math.nan)
-    still = slips = total = disobeyed = 0
+    resting = motions = total = disobeyed = 0
     shortest, slowest, is_turning = 0.0, 0.0, False
     begins: list[float] = []
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
-        rest = rest_speed(piece, least)
+        rest, velocity = rest_speed(piece, least), piece.values["velocity"]
         slowest = max(slowest, rest * (rest > least))
         period = float(piece.time[1] - piece.time[0])
         least_rows = max(1, round(SHAFT.shortest_phase / period))
-        phases = _still(piece, stick_slip_phases(piece.values["velocity"], rest, least_rows), least)
-        total += len(piece.time)
-        if _only_turns(phases, piece.values["velocity"]):
-            slips, is_turning = slips + 1, True
-            lengths, brief = (
-                np.diff(phases.sticks, axis=1),
-                SHAFT.brief * float(np.median(np.diff(phases.slips, axis=1))),
-            )
-            still += int(np.sum(lengths[lengths > brief]))
+        still = _still(piece, at_rest(velocity, rest, least_rows), least)
+        total += len(still)
+        sticks, slips = runs(still), runs(~still)
+        if _only_turns(sticks, slips, velocity):
+            motions, is_turning = motions + 1, True
+            lengths, brief = np.diff(sticks, axis=1), SHAFT.brief * float(np.median(np.diff(slips, axis=1)))
+            resting += int(np.sum(lengths[lengths > brief]))
             shortest = max(shortest, brief * period)
             continue
         shortest = max(shortest, least_rows * period)
-        phases = without_turns(phases, piece.values["velocity"], rest)
-        still += round(phases.stuck * len(piece.time))
-        slips += len(phases.slips)
-        begins += piece.time[phases.slips[:, 0]].tolist()
+        still = without_turns(still, velocity, rest)
+        started = piece.time[runs(~still)[:, 0]].tolist()
+        resting, motions, begins = resting + int(np.sum(still)), motions + len(started), begins + started
         if command is not None:
-            moves = np.abs(_commanded_speed(command, piece.time)) > rest
-            disobeyed += sum(int(np.sum(moves[a:b])) for a, b in phases.sticks.tolist())
+            disobeyed += int(np.sum(still & (np.abs(_commanded_speed(command, piece.time)) > rest)))
     if not total:
         return None
-    unmet = disobeyed / still if command is not None and still else math.nan
-    return Sticking(still / total, slips, unmet, tuple(begins), shortest, is_turning, slowest)
+    unmet = disobeyed / resting if command is not None and resting else math.nan
+    return Sticking(resting / total, motions, unmet, tuple(begins), shortest, is_turning, slowest)
 
 
 def hidden_motion(source: Source) -> float:
@@ -127,22 +123,21 @@ def hidden_motion(source: Source) -> float:
     return distance if distance > SHAFT.joint_rest * SHAFT.way and not rests(source) else 0.0
 
 
-def _still(piece: Piece, phases: Phases, least: float) -> Phases:
-    """The phases without the rests in which the position goes on, as where its rate is too noisy to show it."""
+def _still(piece: Piece, still: Mask, least: float) -> Mask:
+    """The rests without those in which the position goes on, as where its rate is too noisy to show it."""
     if "position" not in piece.values:
-        return phases
-    position, sd = piece.values["position"], piece.noise["position"]
-    kept = [is_still(position[a:b], sd, least * (piece.time[b - 1] - piece.time[a])) for a, b in phases.sticks]
-    return with_sticks(phases.sticks[np.array(kept, np.bool_)], piece.values["velocity"])
+        return still
+    position, sd, time = piece.values["position"], piece.noise["position"], piece.time
+    return with_alone(still, lambda a, b: is_still(position[a:b], sd, least * float(time[b - 1] - time[a])))
 
 
-def _only_turns(phases: Phases, velocity: Numbers) -> bool:
+def _only_turns(sticks: Rows, slips: Rows, velocity: Numbers) -> bool:
     """Whether it is one motion back and forth, which is slow for a moment where it turns."""
-    between = phases.sticks[1:-1]
+    between = sticks[1:-1]
     goes_back = velocity[between[:, 0] - 1] * velocity[between[:, 1]] < 0.0  # not all turns of a motion are rests
-    if len(phases.slips) < 4 or not len(between) or np.mean(goes_back) < SHAFT.turns:
+    if len(slips) < 4 or not len(between) or np.mean(goes_back) < SHAFT.turns:
         return False
-    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
+    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, slips))
     return rest < SHAFT.brief * motion
 
 

@@ -1,7 +1,7 @@
 """One joint or one wrench of one sender and frame, and what was done to its raw values."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
 from itertools import takewhile
 from typing import NamedTuple
@@ -11,12 +11,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.reading import COMMAND
-from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.runs import after_gaps, noise, usual_steps
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
+from wam_bag.columns import JOINT_FIELDS
 
 AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
@@ -153,17 +154,23 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
         is_command = bag.types.get(topic) == COMMAND
         clock, received = found_clocks[topic].times - origin, columns.log_time_ns - origin
         timed: dict[bytes, _Timed] = {}
-        senders = _senders(columns)
+        parts = _parts(columns)
+        nothing = np.full(len(clock), math.nan)
+        numbers = {name: np.isfinite(np.column_stack([nothing, *v.values()])).any(axis=1) for name, v in parts.items()}
+        masks = {mask.tobytes(): mask for mask in numbers.values()}.values()
         for frame, own, sent in _frames(columns, clock / 1e9, is_command):
-            for name, values, units in _parts(columns, given):
-                known, of_sender = _known(values.values(), len(own)), sent & senders.get(name, True)
-                if not np.any(of_sender & own):
+            for name, values in parts.items():
+                known, of_sender = numbers[name], sent
+                if name:  # its sender has all messages with it, or those in some of which alone it comes along
+                    of_sender = sent & max((one for one in masks if one[known].all()), key=np.count_nonzero)
+                if (given.joints and name and name not in given.joints) or not np.any(of_sender & own):
                     continue
                 one = timed.get(of_sender.tobytes()) or _timed(clock, received, columns, of_sender)
                 timed[of_sender.tobytes()] = one
                 mine = (own & known if is_command or not name else own)[one.rows]
                 rows, seconds = one.rows[mine], one.time[mine]
                 taken = {q: v[rows] for q, v in values.items() if np.isfinite(v[rows]).any()}
+                units = {q: given.scaled(q.partition(".")[0])[1] for q in (JOINT_FIELDS if name else AXES)}
                 away = np.unique(clock[sent & ~own] / 1e9)
                 arrived = received[one.rows] / 1e9
                 source = Source(
@@ -172,20 +179,6 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 if np.count_nonzero(known[rows]) >= (1 if is_command else SHAFT.fewest_samples):
                     found.append(_treated(source))
     return _labelled(found)
-
-
-def _known(values: Iterable[Numbers], number: int) -> Mask:
-    """Which of some messages have a number among the values of some quantities."""
-    return np.isfinite(np.column_stack([np.full(number, math.nan), *values])).any(axis=1)
-
-
-def _senders(columns: JointColumns | WrenchColumns) -> dict[str, Mask]:
-    """The messages of the sender of each joint: those that have it, or those in some of which alone it comes along."""
-    if isinstance(columns, WrenchColumns):
-        return {}
-    parts = {name: _known(values.values(), len(columns.stamp_ns)) for name, values, _ in _parts(columns, NOTHING_GIVEN)}
-    masks = {mask.tobytes(): mask for mask in parts.values()}.values()
-    return {name: max((one for one in masks if one[own].all()), key=np.count_nonzero) for name, own in parts.items()}
 
 
 class _Timed(NamedTuple):
@@ -300,21 +293,15 @@ def alternates(source: Source) -> bool:
     return False
 
 
-def _parts(
-    columns: JointColumns | WrenchColumns, given: TopicMap
-) -> list[tuple[str, dict[str, Numbers], dict[str, str]]]:
-    """Name, values and units of each joint, or of the wrench."""
+def _parts(columns: JointColumns | WrenchColumns) -> dict[str, dict[str, Numbers]]:
+    """Values of each joint by its name, or of the wrench by ''."""
     if isinstance(columns, WrenchColumns):
-        both = np.hstack([columns.force, columns.torque])
-        units = {axis: given.scaled(axis.partition(".")[0])[1] for axis in AXES}
-        return [("", {axis: both[:, i] for i, axis in enumerate(AXES)}, units)]
-    quantities = {q: getattr(columns, q) for q in ("position", "velocity", "effort")}
-    units = {q: given.scaled(q)[1] for q in quantities}
-    return [
-        (name, {q: values[:, i] for q, values in quantities.items() if values.shape[1]}, units)
+        return {"": dict(zip(AXES, np.hstack([columns.force, columns.torque]).T, strict=True))}
+    quantities = {q: getattr(columns, q) for q in JOINT_FIELDS}
+    return {
+        name: {q: values[:, i] for q, values in quantities.items() if values.shape[1]}
         for i, name in enumerate(columns.names)
-        if not given.joints or name in given.joints
-    ]
+    }
 
 
 def _received(rows: Index, stamps: Times, received: Times, quantum: int) -> _Timed:

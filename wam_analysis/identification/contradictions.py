@@ -85,18 +85,19 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
     motors, unknowns = shared.arm.motors.names, found.unknowns
     model, torque, used = _torques(shared, unknowns, motion)
     as_recorded = _misfit(model, torque, used)
-    tried: list[tuple[float, Contradiction]] = []
     scale = _ratio(model, torque, used)
-    tried.append((_misfit(model, torque / scale, used), Contradiction(Mistake.SCALED, (), scale)))
+    tried = [(_misfit(model, torque / scale, used), Contradiction(Mistake.SCALED, (), scale))]
     for i, name in enumerate(motors):
         one = np.ones(len(motors))
         one[i] = _ratio(model[:, [i]], torque[:, [i]], used[:, [i]])
         mistake = Contradiction(Mistake.SCALED_MOTOR, (name,), float(one[i]))
         tried.append((_misfit(model, torque / one, used), mistake))
+    # a factor that a torque constant or a mass may be wrong by is no mistake
+    tried = [one for one in tried if not 1.0 / IDENTIFY.heavier < one[1].size < IDENTIFY.heavier]
     for pair in combinations(range(len(motors)), 2):
         mistake = Contradiction(Mistake.SWAPPED, tuple(motors[i] for i in pair), 1.0)
         tried.append((_misfit(*_torques(shared, unknowns, _swapped(motion, *pair))), mistake))
-    least, cause = min((one for one in tried if _is_mistake(one[1])), key=lambda one: one[0])
+    least, cause = min(tried, key=lambda one: one[0])
     is_clear = as_recorded > IDENTIFY.misfit and least < IDENTIFY.better * as_recorded
     return cause if is_clear else None
 
@@ -120,11 +121,6 @@ def _ratio(model: Numbers, torque: Numbers, used: Mask) -> float:
     """How many times the torques of the model the recorded ones are; 1 where that is not known."""
     product, square = float((model * torque * used).sum()), float((model**2 * used).sum())
     return product / square if square and product else 1.0
-
-
-def _is_mistake(found: Contradiction) -> bool:
-    """Whether a factor is one that no torque constant or mass is wrong by."""
-    return found.mistake is Mistake.SWAPPED or not 1.0 / IDENTIFY.heavier < found.size < IDENTIFY.heavier
 
 
 def _swapped(motion: MotionSamples, i: int, j: int) -> MotionSamples:

@@ -85,13 +85,6 @@ class Identification(NamedTuple):
         return ~self.is_identified & (self.alone <= IDENTIFY.identified * self.unknowns.prior_sd)
 
 
-class _Normal(NamedTuple):
-    """Normal equations by part of the motion: (parts, p, p) and (parts, p)."""
-
-    information: Numbers
-    vector: Numbers
-
-
 class _Estimate(NamedTuple):
     """One fit, with the v_s of its regressor; `errors` (parts, n) are squared ones of held-out motion."""
 
@@ -100,7 +93,7 @@ class _Estimate(NamedTuple):
     values: Numbers
     without: Numbers  # (parts, p), estimates without each part
     prior_sd: Numbers
-    normal: _Normal
+    information: Numbers  # (p, p), of all parts
     held_out: Numbers
     errors: Numbers
 
@@ -133,20 +126,20 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     sought = with_kept_weight(sought, shared, still)
     first = estimate(present)
     tried = [estimate(np.full(len(present), velocity), first.values) for velocity in VELOCITIES]
-    chosen = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
-    regressor = Regressor(shared, sought, motion, chosen.velocity)
+    chosen, without = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
+    regressor = Regressor(shared, sought, motion, chosen)
     best = _estimate(regressor, sought)
     moved = _moved_by_averaging(best, sought._replace(prior_sd=best.prior_sd).prior)
     best = best._replace(values=np.maximum(best.values + moved, _least(sought)))
     # the uncertainty of v_s is part of that of the friction of its motor
-    slope = slopes(np.array([one.values for one in tried]), chosen.velocity)
-    off = np.log(chosen.without / chosen.velocity)
+    slope = slopes(np.array([one.values for one in tried]), chosen)
+    off = np.log(without / chosen)
     for i, name in enumerate(shared.arm.motors.names):
         own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
         best.without[:, own] += np.outer(off[:, i], slope[i, own])
     uncertainty = _uncertainty(sought, best, moved, _unknown_torques(regressor, best.values))
     tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
-    return _result(sought, best, chosen.velocity, uncertainty, tracked)
+    return _result(sought, best, chosen, uncertainty, tracked)
 
 
 def _still(shared: Shared, equations: Equations) -> list[int]:
@@ -161,26 +154,21 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Numbers | None = No
     if start is not None:
         values = start
     least = _least(sought)
-    part = _parts(regressor.equations(values))
     for _ in range(IDENTIFY.iterations if start is None else IDENTIFY.warm_iterations):
         equations = regressor.equations(values)
-        normal = _normal(equations, part, values)
-        prior = sought._replace(prior_sd=prior_sd).prior
-        values = _solve(normal.information.sum(0), normal.vector.sum(0), prior, centre)
+        part = np.arange(len(equations.time)) * IDENTIFY.parts // len(equations.time)  # of each sample
+        each = _normal(equations, part, values)
+        information, vector = (one.sum(0) for one in each)
+        values = _solve(information, vector, sought._replace(prior_sd=prior_sd).prior, centre)
         below = values < least
         prior_sd[below], centre[below] = IDENTIFY.pinned * sought.prior_sd[below], least[below]
         values = np.maximum(values, least)
-    information, vector = normal.information.sum(0), normal.vector.sum(0)
-    without = np.array(
-        [
-            _solve(information - i, vector - v, sought._replace(prior_sd=prior_sd).prior, centre)
-            for i, v in zip(*normal, strict=True)
-        ]
-    )
+    prior = sought._replace(prior_sd=prior_sd).prior
+    without = np.array([_solve(information - i, vector - v, prior, centre) for i, v in zip(*each, strict=True)])
     left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
     squares = left**2 * equations.is_used
     errors = np.array([squares[part == i].sum(0) for i in range(IDENTIFY.parts)])
-    return _Estimate(equations, part, values, without, prior_sd, normal, _rms(left, equations.is_used), errors)
+    return _Estimate(equations, part, values, without, prior_sd, information, _rms(left, equations.is_used), errors)
 
 
 def _least(sought: Unknowns) -> Numbers:
@@ -191,14 +179,11 @@ def _least(sought: Unknowns) -> Numbers:
     return least
 
 
-def _parts(equations: Equations) -> Rows:
-    """Part of the motion that each sample belongs to, (k,), of equal numbers of samples."""
-    k = len(equations.time)
-    return np.arange(k) * IDENTIFY.parts // k
+def _normal(equations: Equations, part: Rows, values: Numbers) -> tuple[Numbers, Numbers]:
+    """Weighted normal equations by part of the motion, (parts, p, p) and (parts, p).
 
-
-def _normal(equations: Equations, part: Rows, values: Numbers) -> _Normal:
-    """Weighted normal equations; rows far from the present estimate count less (Huber)."""
+    Rows far from the present estimate count less (Huber).
+    """
     weight = _weights(equations, values)
     p = equations.columns.shape[2]
     information, vector = np.zeros((IDENTIFY.parts, p, p)), np.zeros((IDENTIFY.parts, p))
@@ -207,7 +192,7 @@ def _normal(equations: Equations, part: Rows, values: Numbers) -> _Normal:
         weighted = rows * weight[part == i].reshape(-1, 1)
         information[i] = weighted.T @ rows
         vector[i] = weighted.T @ equations.torque[part == i].ravel()
-    return _Normal(information, vector)
+    return information, vector
 
 
 def _weights(equations: Equations, values: Numbers) -> Numbers:
@@ -247,7 +232,7 @@ def _uncertainty(sought: Unknowns, best: _Estimate, moved: Numbers, unknown: Num
     equations, variance = best.equations, np.zeros(len(sought.names))
     coulomb = [i for way in DIRECTIONS for i in sought.places(f"motors.coulomb_{way}")]
     variance[coulomb] = (IDENTIFY.law * best.values[coulomb]) ** 2
-    white = np.linalg.inv(best.normal.information.sum(0) + sought.prior)
+    white = np.asarray(np.linalg.inv(best.information + sought.prior), np.float64)
     # what the estimate takes for other parameters, were there one sd of the unknown torques
     weighted = equations.columns * _weights(equations, best.values)[..., None]
     taken = white @ np.einsum("knp,knj->pj", weighted, unknown, optimize=True)
@@ -286,7 +271,7 @@ def _moved_by_averaging(best: _Estimate, prior: Numbers) -> Numbers:
 def _result(
     sought: Unknowns, best: _Estimate, velocity: Numbers, uncertainty: Uncertainty, tracked: TrackedErrors
 ) -> Identification:
-    equations, information = best.equations, best.normal.information.sum(0)
+    equations = best.equations
     before = equations.torque - equations.columns @ sought.present
     left = equations.torque - equations.columns @ best.values
     step = float(np.median(np.diff(equations.time)))
@@ -302,7 +287,7 @@ def _result(
         sought,
         best.values,
         uncertainty,
-        1.0 / np.sqrt(np.maximum(information.diagonal(), 1e-300)),
+        1.0 / np.sqrt(np.maximum(best.information.diagonal(), 1e-300)),
         velocity,
         _rms(left, equations.is_used),
         best.held_out,
@@ -318,15 +303,8 @@ def _result(
 VELOCITIES: Final = np.geomspace(0.4, 8.0, 9)  # rad/s, of the motors
 
 
-class StribeckVelocities(NamedTuple):
-    """v_s of each motor, (n,), rad/s; and as it is without each part of the motion, (parts, n)."""
-
-    velocity: Numbers
-    without: Numbers
-
-
-def stribeck_velocities(present: Numbers, present_errors: Numbers, errors: Numbers) -> StribeckVelocities:
-    """Velocities by the squared errors of held-out motion.
+def stribeck_velocities(present: Numbers, present_errors: Numbers, errors: Numbers) -> tuple[Numbers, Numbers]:
+    """v_s of each motor, (n,), rad/s, by the squared errors of held-out motion; and without each part, (parts, n).
 
     Parameters
     ----------
@@ -338,7 +316,7 @@ def stribeck_velocities(present: Numbers, present_errors: Numbers, errors: Numbe
     is_better = total.min(0) < (1.0 - IDENTIFY.worth) * present_errors.sum(0)
     best = np.where(is_better, _minimum(total), present)
     left_out = np.array([_minimum(total - part) for part in errors.transpose(1, 0, 2)])
-    return StribeckVelocities(best, np.where(is_better, left_out, present))
+    return best, np.where(is_better, left_out, present)
 
 
 def slopes(values: Numbers, velocity: Numbers) -> Numbers:

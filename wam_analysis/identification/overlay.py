@@ -26,14 +26,12 @@ class Identified(NamedTuple):
     ----------
     names : p.
     present, values, sd : (p,).
-    covariance : (p, p).
     """
 
     names: tuple[str, ...]
     present: Numbers
     values: Numbers
     sd: Numbers
-    covariance: Numbers
 
 
 def identified(found: Identification) -> Identified:
@@ -43,10 +41,8 @@ def identified(found: Identification) -> Identified:
     for way in DIRECTIONS:
         rows, columns = (found.unknowns.places(f"motors.{what}_{way}") for what in ("static", "coulomb"))
         mixing[rows, columns] = 1.0
-    covariance = mixing @ found.covariance @ mixing.T
-    return Identified(
-        names, mixing @ found.unknowns.present, mixing @ found.values, np.sqrt(covariance.diagonal()), covariance
-    )
+    sd = np.sqrt((mixing @ found.covariance @ mixing.T).diagonal())
+    return Identified(names, mixing @ found.unknowns.present, mixing @ found.values, sd)
 
 
 def model_values(shared: Shared, found: Identification, source: str) -> dict[str, Any]:

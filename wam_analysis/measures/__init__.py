@@ -5,7 +5,6 @@ limit_cycle         amplitude, period and confidence of a limit cycle
 episodes            limit cycles that fill a part of a recording
 lines               lines in the spectrum, above the noise
 swings              whether a motion settles, cycles or diverges
-stick_slip_phases   phases of rest and of motion
 friction            static, dynamic and viscous friction
-runs                intervals of a condition, missing messages, noise, smoothing
+runs                intervals of a condition, rest and motion, missing messages, noise, smoothing
 """

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.measures.runs import after_gaps, noise
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.runs import after_gaps, at_rest, noise, runs
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Index, Mask, Numbers, Rows
 
@@ -34,6 +33,7 @@ class FrictionNumber(NamedTuple):
 
 
 UNKNOWN = FrictionNumber()
+_Fitted = tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]  # factors, errors, rms and share of the rest
 
 
 class Friction(NamedTuple):
@@ -130,7 +130,7 @@ def _in_motion(
     half: int,
     period: float,
     allowed: Mask,
-) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
+) -> _Fitted:
     """Dynamic, viscous, inertia, offset and factors of the load by least squares, errors, rms and share of the rest."""
     nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, (math.nan, math.nan))
     triangle = np.pad(np.concatenate([np.arange(1, half + 2), np.arange(half, 0, -1)]).astype(float), 2)
@@ -139,28 +139,26 @@ def _in_motion(
     if len(velocity) < len(triangle):
         return nothing
     reach = np.ones(len(triangle))
-    onward = np.convolve((allowed & (velocity > rest)).astype(float), reach, "same") > len(reach) - 0.5
-    back = np.convolve((allowed & (velocity < -rest)).astype(float), reach, "same") > len(reach) - 0.5
+    onward, back = (
+        np.convolve((allowed & moves).astype(float), reach, "same") > len(reach) - 0.5
+        for moves in (velocity > rest, velocity < -rest)
+    )
     ways = [float(np.sum(np.abs(velocity[each]))) for each in (onward, back)]
     rows = np.flatnonzero(onward | back)
     if len(rows) < SHAFT.fewest_samples or 0.0 < min(ways) < SHAFT.both_ways * max(ways):
         return nothing
-    v = np.convolve(velocity, triangle, "same")[rows]
+    v, wanted, *others = (np.convolve(each, triangle, "same")[rows] for each in (velocity, torque, *load.T, *waves.T))
     acceleration = np.convolve(velocity, slope, "same")[rows] / period
-    acting = [np.convolve(column, triangle, "same")[rows] for column in load.T]
-    columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows)), *acting])
-    wanted = np.convolve(torque, triangle, "same")[rows]
-    unknown = [np.convolve(wave, triangle, "same")[rows] for wave in waves.T]
-    disturbances = np.column_stack([np.empty((len(rows), 0)), *unknown])
+    direction, number = np.where(onward[rows], 1.0, -1.0), load.shape[1]
+    columns = np.column_stack([direction, v, acceleration, np.ones(len(rows)), *others[:number]])
+    disturbances = np.column_stack([np.empty((len(rows), 0)), *others[number:]])
     solution, errors, left = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
     scatter = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
     uneven = SHAFT.uneven * abs(solution[0]) / scatter if scatter > 0.0 else math.inf
     return solution, (errors[0], math.hypot(errors[1], uneven), *errors[2:]), left
 
 
-def _robust(
-    columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half: Rows
-) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
+def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half: Rows) -> _Fitted:
     """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
 
     The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such
@@ -171,8 +169,6 @@ def _robust(
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     keep = np.ones(len(wanted), dtype=np.bool_)
-    used = _distinct(columns, width)
-    solution, rest = np.zeros(len(used)), wanted
     for _ in range(4):
         if np.count_nonzero(keep) < SHAFT.fewest_samples:
             break
@@ -290,21 +286,21 @@ def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) ->
 def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> _Breakaways:
     """Torque against the rest at the end of each stick, with the sign of the slip that follows."""
     sd = noise(velocity[np.abs(velocity) <= rest])
-    phases = stick_slip_phases(velocity, max(3.0 * sd, SHAFT.still * rest), max(window // 4, 1))
-    begins = {int(begin): direction for (begin, _), direction in zip(phases.slips, phases.directions, strict=True)}
+    still = at_rest(velocity, max(3.0 * sd, SHAFT.still * rest), max(window // 4, 1))
+    slips = {begin: float(np.sign(np.mean(velocity[begin:end]))) for begin, end in runs(~still).tolist()}
     level = float(np.percentile(np.abs(torque), 90.0))
     needed = (2.0 * noise(torque) / (SHAFT.precise * level)) ** 2 if level > 0.0 else 0.0
     length = int(np.clip(needed, max(window // 4, 4), max(window, 4)))
     found = []
-    for begin, end in phases.sticks:
-        still = np.flatnonzero(np.abs(velocity[begin:end]) <= max(sd, SHAFT.still * rest))
-        last = int(begin + still[-1]) + 1 if len(still) else int(begin)
-        first = max(int(begin), last - length)
+    for begin, end in runs(still).tolist():
+        slow = np.flatnonzero(np.abs(velocity[begin:end]) <= max(sd, SHAFT.still * rest))
+        last = begin + int(slow[-1]) + 1 if len(slow) else begin
+        first = max(begin, last - length)
         # counts of an encoder in these rows are too few for a motion, and still one
         is_stuck = np.all(allowed[first:last]) and np.all(np.abs(velocity[first:last]) <= rest)
-        if int(end) in begins and last - first >= 4 and is_stuck:
+        if end in slips and last - first >= 4 and is_stuck:
             step = float(np.max(np.abs(np.diff(torque[last - 3 : last]))))
             line = np.polynomial.polynomial.polyfit(np.arange(first, last) + 1.0 - last, torque[first:last], 1)
-            found.append((begins[int(end)] * float(line[0]), step, last - 1))
+            found.append((slips[end] * float(line[0]), step, last - 1))
     torques, steps, rows = np.array(found, dtype=np.float64).reshape(-1, 3).T
     return _Breakaways(torques, steps, rows.astype(np.int64))

@@ -1,9 +1,11 @@
 """Intervals in which a condition holds, usual and missing times, and the noise of a signal."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from wam_analysis.thresholds import STREAM
+from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers, Rows, Times
 
 
@@ -90,6 +92,55 @@ def without_short(mask: Mask, shortest: int) -> Mask:
             turns[bounds[merged]] = turns[bounds[merged + 1]] = True
             kept ^= np.logical_xor.accumulate(turns)
     return kept
+
+
+def with_alone(mask: Mask, holds: Callable[[int, int], bool]) -> Mask:
+    """The mask with those of its intervals alone for whose rows [begin, end) a condition holds."""
+    found = np.zeros_like(mask)
+    for begin, end in runs(mask).tolist():
+        found[begin:end] = holds(begin, end)
+    return found
+
+
+def at_rest(velocity: Numbers, rest: float, shortest: int) -> Mask:
+    """Whether a shaft sticks or slips at each sample, (n,).
+
+    Parameters
+    ----------
+    velocity : (n,), rad/s or m/s, at a constant rate.
+    rest : speed up to which it is at rest, above the sensor's noise.
+    shortest : samples that a rest or a motion lasts at least; shorter ones are merged into their neighbours.
+
+    Raises
+    ------
+    ValueError
+        if `rest` is not above zero or the velocity is not finite.
+    """
+    if not (rest > 0.0 and np.all(np.isfinite(velocity))):
+        raise ValueError(f"rest is {rest!r}; it must be above the noise of the velocity, which must be finite")
+    return without_short(np.abs(velocity) <= rest, shortest)
+
+
+def without_turns(still: Mask, velocity: Numbers, rest: float) -> Mask:
+    """The rests without those in which a smooth motion only turns back or is slow, as a slow sine does.
+
+    Such a motion passes through the speeds of rest evenly, or does not come near zero; a shaft that sticks is at zero
+    for most of the time.
+
+    Parameters
+    ----------
+    still : (n,), see `at_rest`.
+    velocity : (n,), rad/s or m/s.
+    rest : speed up to which it was counted as at rest.
+    """
+
+    def sticks(begin: int, end: int) -> bool:
+        if not begin or end == len(velocity):
+            return True
+        part = 50.0 if velocity[begin - 1] * velocity[end] < 0.0 else 5.0
+        return bool(np.percentile(np.abs(velocity[begin:end]), part) <= SHAFT.passing * rest)
+
+    return with_alone(still, sticks)
 
 
 def noise(value: Numbers) -> float:
