@@ -1,5 +1,6 @@
 """A recording: what is in a bag, prepared for the sections of an analysis; each is found where it is first used."""
 
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -194,23 +195,19 @@ class AnalysedRecording:
         }
 
     @property
-    def settling_times(self) -> list[tuple[int, float]]:
-        """Those of the force loop, s, and since when it had each, ns; NaN where it was not recorded."""
-        key = f"{FORCE_LOOP}:{SETTLING_TIME}"
-        try:
-            first = self.run.parameters.node(FORCE_LOOP).get(SETTLING_TIME)
-        except BagError:
-            first = None
-        changes = [(since, values[key]) for since, values in self.run.live_values(FORCE_LOOP) if key in values]
-        every = [(0, first), *changes]
-        return [(since, float(value) if isinstance(value, (int, float)) else np.nan) for since, value in every]
-
-    @property
     def unassessed(self) -> tuple[list[RecordedStep], str]:
         """The steps that are too short to be assessed, and that in words."""
+        key, first = f"{FORCE_LOOP}:{SETTLING_TIME}", None
+        with suppress(BagError):
+            first = self.run.parameters.node(FORCE_LOOP).get(SETTLING_TIME)
+        changes = [(since, values[key]) for since, values in self.run.live_values(FORCE_LOOP) if key in values]
+        settling = [  # time of the force loop, s, and since when it had each, ns; NaN where it was not recorded
+            (since, float(value) if isinstance(value, (int, float)) else np.nan)
+            for since, value in [(0, first), *changes]
+        ]
         watched = watched_times(self.tasks, without_forces=True)
-        found = unassessed(self.reactions, watched, self.steps, self.settling_times)
-        return found, too_short(self.settling_times, found)
+        found = unassessed(self.reactions, watched, self.steps, settling)
+        return found, too_short(settling, found)
 
     # contacts
 

@@ -35,7 +35,11 @@ def fields(text: str, package: str) -> Fields:
         match = _FIELD.match(line.split("#")[0].strip())
         if match is None or match[5]:
             continue
-        kind = _field_type(match[1], package)
+        kind = match[1]
+        if kind == "Header":
+            kind = "std_msgs/msg/Header"
+        elif kind not in PRIMITIVES and kind not in ("string", "wstring"):
+            kind = _TIMES.get(kind) or full_name(kind if "/" in kind else f"{package}/{kind}")
         length = None if match[3] is None else 0 if match[2] or not match[3] else int(match[3])
         found.append(MessageField(match[4], kind, length))
     return tuple(found)
@@ -93,11 +97,3 @@ def full_name(name: str) -> str:
     """The name of a type as ROS 2 has it, package/msg/Type; one without a package stays as it is."""
     package, slash, kind = name.partition("/")
     return f"{package}/msg/{kind.removeprefix('msg/')}" if slash else name
-
-
-def _field_type(kind: str, package: str) -> str:
-    if kind in PRIMITIVES or kind in ("string", "wstring"):
-        return kind
-    if kind == "Header":
-        return "std_msgs/msg/Header"
-    return _TIMES.get(kind) or full_name(kind if "/" in kind else f"{package}/{kind}")

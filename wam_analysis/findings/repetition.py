@@ -144,8 +144,10 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_frequency:
             continue  # the commanded motion itself, which it does not follow linearly, or the steps of its messages
+        order = 1.0 / (one.cycle.period * frequency) if frequency > 0.0 else math.inf
+        is_harmonic = order <= 0.5 + CYCLE.harmonics and abs(order - round(order)) <= CYCLE.near_harmonic
         error = (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak
-        result.append(FoundCycle(one, HARMONIC if _is_harmonic(one, frequency) else LIMIT_CYCLE, error))
+        result.append(FoundCycle(one, HARMONIC if is_harmonic else LIMIT_CYCLE, error))
     return result
 
 
@@ -167,12 +169,6 @@ def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterato
             yield one._replace(cycle=one.cycle._replace(peak_to_peak=size_of_cycle(stamps, level, period)))
         else:
             yield one
-
-
-def _is_harmonic(one: Episode, frequency: float) -> bool:
-    """Whether an episode is one of the first harmonics of a frequency, 0 for none."""
-    order = 1.0 / (one.cycle.period * frequency) if frequency > 0.0 else math.inf
-    return order <= 0.5 + CYCLE.harmonics and abs(order - round(order)) <= CYCLE.near_harmonic
 
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:

@@ -52,14 +52,8 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
     chosen = [
         name for name, kind in source.types.items() if name in named or (kind in read_as_it_is and not given.topics)
     ]
-    is_mapped = bool(given.fields) or "stamp" in given.units
-    return _analysed(read(source.path, chosen, as_messages=is_mapped), given)
-
-
-def _analysed(bag: Bag, given: TopicMap) -> Bag:
-    """The bag with columns of joints and wrenches alone."""
-    missing = [name for name in (*given.topics, *given.commands) if name not in bag.topics]
-    if missing:
+    bag = read(source.path, chosen, as_messages=bool(given.fields) or "stamp" in given.units)
+    if missing := [name for name in named if name not in bag.topics]:
         listed = ", ".join(sorted(bag.counts)) or "none"
         raise ValueError(f"{bag.path} has no topic {missing[0]}; its topics: {listed}")
     first = {name: one.messages[0] for name, one in bag.topics.items() if isinstance(one, Messages) and one.messages}

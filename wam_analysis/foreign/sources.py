@@ -249,7 +249,9 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     masks = {frame: frames == frame for frame in dict.fromkeys(frames.tolist())}
     most = max(masks.values(), key=np.count_nonzero)
     is_seldom = is_command and np.count_nonzero(most) < SHAFT.fewest_samples
-    if len(masks) > 1 and not is_seldom and _is_besides(time, most):
+    rows = np.flatnonzero(most)
+    steps, has_others = np.diff(time[rows]), np.diff(rows) > 1  # besides others: they go on at their period
+    if not is_seldom and np.any(has_others) and np.median(steps[has_others]) < STREAM.absent * np.median(steps):
         return [(frame, mask, mask) for frame, mask in masks.items()]
     every = np.ones(len(frames), dtype=bool)
     if isinstance(columns, JointColumns) or len(masks) == 1:
@@ -257,13 +259,6 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     nothing = ~np.any(np.hstack([columns.force, columns.torque]), axis=1)
     acting = {frame: mask | nothing for frame, mask in masks.items() if not np.all(nothing[mask])}
     return [(frame, mask, every) for frame, mask in (acting or {next(iter(masks)): every}).items()]
-
-
-def _is_besides(time: Numbers, own: Mask) -> bool:
-    """Whether the messages of a frame go on at their period while those of others come."""
-    rows = np.flatnonzero(own)
-    steps, has_others = np.diff(time[rows]), np.diff(rows) > 1
-    return bool(np.any(has_others)) and float(np.median(steps[has_others])) < STREAM.absent * float(np.median(steps))
 
 
 def alternates(source: Source) -> bool:

@@ -115,8 +115,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
         raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
-    _require_one_run(path, times)
-    _require_one_row(path, times, series)
+    _require_one_run(path, times, series)
     for one in every:
         if (number := np.size(one.values)) != len(known):
             raise BagError(
@@ -165,8 +164,11 @@ def _topics(
         yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz") for q in ("force", "torque")))
 
 
-def _require_one_run(path: Path, times: Times) -> None:
-    """Refuse a table whose time is constant or begins again; rows that are only in another order are put in order."""
+def _require_one_run(path: Path, times: Times, series: Mapping[str, Any]) -> None:
+    """Refuse a table whose time is constant or begins again; rows that are only in another order are put in order.
+
+    Refused, too, is one with several rows at each time, which a column distinguishes, as by the name of a joint.
+    """
     if len(times) > 1 and not np.ptp(times):
         raise BagError(
             f"{path}: the time is the same in all {len(times)} rows; name its column with --map stamp=COLUMN"
@@ -178,10 +180,6 @@ def _require_one_run(path: Path, times: Times) -> None:
             f"{path}: after {again[0] + 1} rows the time goes back by {back:.4g} s, as where a second recording "
             "begins; give each by itself"
         )
-
-
-def _require_one_row(path: Path, times: Times, series: Mapping[str, Any]) -> None:
-    """Refuse a table with several rows at each time, which a column distinguishes, as by the name of a joint."""
     rows = times.tolist()
     instants = len({*rows})
     for title, column in series.items() if instants < len(rows) else ():

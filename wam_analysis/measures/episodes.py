@@ -46,7 +46,11 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
                 continue
             flat = without_drift(time, value, cycle.period)
             first, last = _extended(time, flat, rows, cycle.period, free)
-            inner = _evaluated(first, last, n, cycle.period / float(time[1] - time[0]))
+            lag = cycle.period / float(time[1] - time[0])
+            edge = round(CYCLE.edge * lag)
+            inner = slice(first + edge if first else 0, last - edge if last < n else n)
+            if inner.stop - inner.start < CYCLE.episode_cycles * lag:
+                inner = slice(first, last)  # with its ends within the recording
             period = _refined(time[inner], flat[inner], cycle.period)
             both = [_cycle(time[inner], signal[inner], least, period) for signal in (value, flat)]
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
@@ -136,13 +140,6 @@ def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: Ma
     shared = np.minimum(parts[:, 1], rows.stop) - np.maximum(parts[:, 0], rows.start)
     first, last = parts[int(np.argmax(shared))].tolist()
     return first, last
-
-
-def _evaluated(first: int, last: int, n: int, lag: float) -> slice:
-    """Rows of an episode without its ends within the recording, unless too few cycles of `lag` samples are left."""
-    edge = round(CYCLE.edge * lag)
-    inner = slice(first + edge if first else 0, last - edge if last < n else n)
-    return inner if inner.stop - inner.start >= CYCLE.episode_cycles * lag else slice(first, last)
 
 
 def _changes(time: Numbers, flat: Numbers, period: float) -> bool:
