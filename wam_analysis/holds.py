@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from wam_control.force.contact_place import pinned_position
 from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
-from wam_description.signals import ForceCommand, Table
+from wam_description.signals import ForceCommand
 from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 from wam_sim.replay import tables
@@ -70,15 +71,12 @@ def tasks_of(run: RecordedRun, arm: Arm | None) -> list[RecordedTask]:
         return []
     every = list(tables(columns))
     changes = np.array([one != before for before, one in pairwise(map(str, every))], np.bool_)
-    found = ((_task(every[row], arm), begin, end) for row, begin, end in intervals(columns.stamp_ns, changes))
-    return [(task, begin, end) for task, begin, end in found if task is not None]
-
-
-def _task(table: Table, arm: Arm) -> TaskCommand | None:
-    try:
-        return task_of(table, arm)
-    except ParameterError:  # refused when it was commanded, too
-        return None
+    found = []
+    for row, begin, end in intervals(columns.stamp_ns, changes):
+        with suppress(ParameterError):  # refused when it was commanded, too
+            if (task := task_of(every[row], arm)) is not None:
+                found.append((task, begin, end))
+    return found
 
 
 def task_forces(tasks: Iterable[RecordedTask]) -> Iterator[Hold]:

@@ -8,7 +8,8 @@ import numpy as np
 from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contacts, true_contacts
 from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theory_of
 from wam_analysis.findings.transmission import TransmissionFriction, transmission_friction
-from wam_analysis.foreign.sources import Source, alternates, command_of, sources
+from wam_analysis.foreign.reading import COMMAND
+from wam_analysis.foreign.sources import Source, alternates, shared_parts, sources
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.holds import Hold, RecordedTask, holds_of, task_forces, tasks_of
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
@@ -105,8 +106,19 @@ class AnalysedRecording:
         return tuple(one for one in self.analysed if one.is_command)
 
     def command_of(self, source: Source) -> Source | None:
-        """What was commanded of a joint or wrench; None where that is not known."""
-        return command_of(source, self.commands, self.states)
+        """The command of a joint by its name, of a wrench in its frame or with none; of several the most alike by name.
+
+        A command is of the states whose topics share most parts with its own: of two robots, as /left/joint_states and
+        /right/joint_states, neither has that of the other.  What a controller reports with its command does not count.
+        """
+        own = [
+            one for one in self.commands if one.name == source.name and (source.is_joint or source.shares_frame(one))
+        ]
+        for one in tuple(own):
+            others = (two for two in self.states if two.name == source.name and f"{two.topic} {COMMAND}" != one.topic)
+            if shared_parts(one, source) < max((shared_parts(one, two) for two in others), default=0):
+                own.remove(one)
+        return max(own, key=lambda one: shared_parts(one, source), default=None)
 
     # the run
 

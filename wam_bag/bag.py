@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import yaml
@@ -67,7 +66,7 @@ class Bag(NamedTuple):
     types: dict[str, str]
     attachments: dict[str, bytes]
     metadata: dict[str, dict[str, str]]
-    counts: Mapping[str, int] = MappingProxyType({})
+    counts: Mapping[str, int] = {}
     first: int = 0
     last: int = 0
     unread: frozenset[str] = frozenset()

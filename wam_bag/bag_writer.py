@@ -23,7 +23,7 @@ from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
 from wam_bag.errors import RecordingError, command
 from wam_bag.mcap_writer import FAST, McapWriter
-from wam_bag.metadata import LIBRARY, FileSummary, bag_information, described_topic, write_metadata
+from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
 
 __all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "release"]
 
@@ -79,11 +79,10 @@ class BagWriter:
         self._largest = split.size or math.inf  # bytes of a file
         self._longest = round(split.seconds * 1e9) or math.inf  # ns in a file
         self._files: list[FileSummary] = []
-        self._topics: list[dict[str, Any]] = []
-        self._channels: dict[str, int] = {}
+        self._topics: dict[str, tuple[Channel, Schema]] = {}
         self._lengths: dict[str, ExactLength] = {}
         self._counts: Counter[int] = Counter()  # by channel id, of the files that are finished
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[str, Schema] = {}
         self._next_flush = 0.0
         self._file_begin: int | None = None
         _make(path)
@@ -114,9 +113,11 @@ class BagWriter:
         kind : type, ``package/msg/Type``, one of `definitions`.
         qos : policies that the publishers offer, see `metadata.offered`.
         """
-        self._topics.append(described_topic(name, kind, "cdr", [qos], type_hash(kind)))
-        self._define(self._topics[-1])
+        definition = self._schemas.setdefault(kind, Schema(len(self._schemas) + 1, schema(kind), "ros2msg", kind))
+        metadata = {"offered_qos_profiles": safe_yaml.dump([qos]).strip(), "topic_type_hash": type_hash(kind)}
+        self._topics[name] = Channel(len(self._topics) + 1, name, "cdr", metadata, definition.id), definition
         self._lengths[name] = ExactLength(kind)
+        self._define(name)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
         """Write one message.
@@ -133,7 +134,7 @@ class BagWriter:
         RecordingError
             if it cannot be written to disk; the bag is closed then and can be read.
         """
-        channel = self._channels[topic]
+        channel, _ = self._topics[topic]
         length = self._lengths[topic](data)
         if length < len(data):
             data = data[:length]
@@ -145,7 +146,7 @@ class BagWriter:
                 self._finish_file()
                 self._file_begin = log_time
                 self._open()
-            self._writer.add(channel, log_time, publish_time, sequence, data)
+            self._writer.add(channel.id, log_time, publish_time, sequence, data)
         except OSError as error:
             self._give_up(error)
 
@@ -229,14 +230,11 @@ class BagWriter:
     def _file_name(self) -> str:
         return f"{self.path.name}_{len(self._files)}.mcap"
 
-    def _define(self, topic: Mapping[str, Any]) -> None:
+    def _define(self, topic: str) -> None:
         """Define a topic in the present file."""
-        kind, offered = topic["type"], safe_yaml.dump(topic["offered_qos_profiles"]).strip()
-        metadata = {"offered_qos_profiles": offered, "topic_type_hash": topic["type_description_hash"]}
-        number = self._schemas.setdefault(kind, len(self._schemas) + 1)
-        channel = self._channels.setdefault(topic["name"], len(self._channels) + 1)
-        self._writer.define(Schema(number, schema(kind), "ros2msg", kind))
-        self._writer.define(Channel(channel, topic["name"], "cdr", metadata, number))
+        channel, definition = self._topics[topic]
+        self._writer.define(definition)
+        self._writer.define(channel)
 
     def _finish_file(self) -> None:
         writer = self._writer
@@ -283,7 +281,8 @@ class BagWriter:
         write_metadata(self.path, self._information(self._files, self._counts))
 
     def _information(self, files: Sequence[FileSummary], counts: Counter[int]) -> dict[str, Any]:
-        return bag_information(files, self._topics, [counts[channel] for channel in self._channels.values()])
+        topics = [topic_information(*records) for records in self._topics.values()]
+        return bag_information(files, topics, [counts[channel.id] for channel, _ in self._topics.values()])
 
 
 def _reserve(path: Path) -> BinaryIO:

@@ -7,7 +7,6 @@ of them, and a column is a view of many records at once.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import attrgetter
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -43,7 +42,7 @@ class JointColumns(NamedTuple):
     position: Numbers
     velocity: Numbers
     effort: Numbers
-    irregular: Mapping[str, int] = MappingProxyType({})
+    irregular: Mapping[str, int] = {}
 
 
 class WrenchColumns(NamedTuple):

@@ -4,7 +4,6 @@ import json
 from collections import Counter
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import yaml
@@ -71,7 +70,7 @@ class Losses(NamedTuple):
     missing: dict[str, int]
     dropped: dict[str, int]
     uncounted: bool
-    at_end: Mapping[str, int] = MappingProxyType({})
+    at_end: Mapping[str, int] = {}
     unfinished: str = ""
 
     @property

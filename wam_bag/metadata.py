@@ -80,19 +80,12 @@ def write_metadata(path: Path, information: Mapping[str, Any]) -> None:
 
 def topic_information(channel: Channel, schema: Schema) -> dict[str, Any]:
     """One topic in metadata.yaml, from its records in a file."""
-    policies = profiles(channel.metadata.get("offered_qos_profiles", ""))
-    digest = channel.metadata.get("topic_type_hash", "")
-    return described_topic(channel.topic, schema.name, channel.message_encoding, policies, digest)
-
-
-def described_topic(name: str, kind: str, encoding: str, policies: Any, digest: str) -> dict[str, Any]:
-    """One topic in metadata.yaml: its type, with the policies that its publishers offer and its hash."""
     return {
-        "name": name,
-        "type": kind,
-        "serialization_format": encoding,
-        "offered_qos_profiles": policies,
-        "type_description_hash": digest,
+        "name": channel.topic,
+        "type": schema.name,
+        "serialization_format": channel.message_encoding,
+        "offered_qos_profiles": profiles(channel.metadata.get("offered_qos_profiles", "")),
+        "type_description_hash": channel.metadata.get("topic_type_hash", ""),
     }
 
 

@@ -173,9 +173,7 @@ def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterato
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:
     """A signal less what follows a command, or the way of a commanded velocity, linearly; None where that is still."""
-    if len(command.time) < SHAFT.fewest_samples or _begins_after(command, piece.time[0]):
-        return None
-    if np.any(command.is_away(piece.time)):
+    if len(command.time) < SHAFT.fewest_samples or not _is_known(command, piece.time):
         return None
     (known,) = command.values
     desired = held(command, known, piece.time)
@@ -198,21 +196,22 @@ def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
 
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:
     """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if it is not known."""
-    if command is None or not len(command.time) or _begins_after(command, one.begin):
+    time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
+    if command is None or not len(command.time) or not _is_known(command, time):
         return None
     (known,) = command.values
-    time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
-    if np.any(command.is_away(time)):
-        return None
     cycle = limit_cycle(time, held(command, known, time))
     is_small = known == quantity and cycle.peak_to_peak < CYCLE.commanded * one.cycle.peak_to_peak
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 
-def _begins_after(command: Source, begin: float) -> bool:
-    """Whether nothing was commanded yet; of two topics that begin at once either may have the first message."""
+def _is_known(command: Source, time: Numbers) -> bool:
+    """Whether it is known what was commanded at some times.
+
+    Of two topics that begin at once either may have the first message.
+    """
     period = float(np.median(np.diff(command.time))) if len(command.time) >= SHAFT.fewest_samples else 0.0
-    return float(command.time[0]) > begin + STREAM.absent * period
+    return bool(command.time[0] <= time[0] + STREAM.absent * period) and not np.any(command.is_away(time))
 
 
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -165,8 +164,8 @@ class TransmissionFriction(NamedTuple):
     """
 
     signals: TransmissionSignals | None
-    motors: Mapping[str, Friction] = MappingProxyType({})
-    joints: Mapping[str, Friction] = MappingProxyType({})
+    motors: Mapping[str, Friction] = {}
+    joints: Mapping[str, Friction] = {}
     unknown: str = ""
 
 

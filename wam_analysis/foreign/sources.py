@@ -1,7 +1,6 @@
 """One joint or one wrench of one sender and frame, and what was done to its raw values."""
 
 import math
-from collections.abc import Sequence
 from enum import StrEnum
 from itertools import takewhile
 from typing import NamedTuple
@@ -425,21 +424,7 @@ def _labelled(found: list[Source]) -> list[Source]:
     return result
 
 
-def command_of(source: Source, commands: Sequence[Source], states: Sequence[Source]) -> Source | None:
-    """The command of a joint by its name, of a wrench in its frame or with none; of several the one named most alike.
-
-    A command is of the states whose topics share most parts with its own: of two robots, as /left/joint_states and
-    /right/joint_states, neither has that of the other.  What a controller reports with its command does not count.
-    """
-    own = [one for one in commands if one.name == source.name and (source.is_joint or source.shares_frame(one))]
-    for one in tuple(own):
-        others = (two for two in states if two.name == source.name and f"{two.topic} {COMMAND}" != one.topic)
-        if _shared(one, source) < max((_shared(one, two) for two in others), default=0):
-            own.remove(one)
-    return max(own, key=lambda one: _shared(one, source), default=None)
-
-
-def _shared(one: Source, other: Source) -> int:
+def shared_parts(one: Source, other: Source) -> int:
     """How many parts the names of two topics have in common from the beginning."""
     parts = zip(one.topic.strip("/").split("/"), other.topic.strip("/").split("/"), strict=False)
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], parts))

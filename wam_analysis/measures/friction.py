@@ -117,7 +117,7 @@ def identify_friction(
     dynamic, viscous, inertia, offset = map(FrictionNumber, solution[:4], errors[:4])
     steady = acting @ np.nan_to_num(np.array(solution[4:])) + np.nan_to_num(offset.value)
     breakaways = _breakaways(velocity, torque - steady, rest, 2 * half, allowed)
-    static, count = _static(breakaways, dynamic.value, math.hypot(dynamic.error, left[0]), unknown)
+    static, count = _static(*breakaways, dynamic.value, math.hypot(dynamic.error, left[0]), unknown)
     return Friction(static, dynamic, viscous, inertia, offset.value, count, *left)
 
 
@@ -253,38 +253,37 @@ def _few(freedom: float) -> float:
     return math.sqrt(n * math.expm1(deviate**2 / n)) / SHAFT.sigmas
 
 
-class _Breakaways(NamedTuple):
-    """Ends of sticks, (k,): torque in the direction of the slip, its larger change in the last two periods, row."""
-
-    torque: Numbers
-    step: Numbers
-    row: Rows
-
-
-def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) -> tuple[FrictionNumber, int]:
+def _static(
+    torques: Numbers, steps: Numbers, rows: Rows, dynamic: float, noise: float, waves: Numbers
+) -> tuple[FrictionNumber, int]:
     """Static friction and the number of breakaways that count.
 
     A shaft that creeps carries dynamic friction, about which the torque scatters by `noise`: breakaways that rise by no
     more may all be of a shaft that never stuck, and the error is infinite.  The part of `waves` in it is in the error.
     """
-    near = found.torque >= dynamic  # what moved at less was creeping; where it never slid, it was no breakaway
+    near = torques >= dynamic  # what moved at less was creeping; where it never slid, it was no breakaway
     if not np.any(near):
         return UNKNOWN, 0
-    count = found.torque >= (dynamic + float(np.min(np.sort(found.torque[near])[-SHAFT.agreeing :]))) / 2.0
-    torque = found.torque[count]
+    count = torques >= (dynamic + float(np.min(np.sort(torques[near])[-SHAFT.agreeing :]))) / 2.0
+    torque = torques[count]
     static = float(np.median(torque))
-    wave = float(np.sqrt(np.mean(np.sum(waves[found.row[count]] ** 2, axis=1))))
+    wave = float(np.sqrt(np.mean(np.sum(waves[rows[count]] ** 2, axis=1))))
     if not static - dynamic > SHAFT.sigmas * math.sqrt(max(noise**2 - wave**2, 0.0)):
         return FrictionNumber(static, math.inf), len(torque)
     scatter = 1.4826 * float(np.median(np.abs(torque - static)))
     alike = _few(len(torque) - 1.0) * scatter / math.sqrt(len(torque))
-    step = float(np.median(np.maximum(found.step, dynamic - found.torque)))
+    step = float(np.median(np.maximum(steps, dynamic - torques)))
     error = math.hypot(alike, SHAFT.creep * (static - dynamic), step, wave)
     return FrictionNumber(static, error), len(torque)
 
 
-def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> _Breakaways:
-    """Torque against the rest at the end of each stick, with the sign of the slip that follows."""
+def _breakaways(
+    velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask
+) -> tuple[Numbers, Numbers, Rows]:
+    """Torque against the rest at the end of each stick, with the sign of the slip that follows.
+
+    Then its larger change in the last two periods, and the row, (k,) each.
+    """
     sd = noise(velocity[np.abs(velocity) <= rest])
     still = at_rest(velocity, max(3.0 * sd, SHAFT.still * rest), max(window // 4, 1))
     slips = {begin: float(np.sign(np.mean(velocity[begin:end]))) for begin, end in runs(~still).tolist()}
@@ -303,4 +302,4 @@ def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, al
             line = np.polynomial.polynomial.polyfit(np.arange(first, last) + 1.0 - last, torque[first:last], 1)
             found.append((slips[end] * float(line[0]), step, last - 1))
     torques, steps, rows = np.array(found, dtype=np.float64).reshape(-1, 3).T
-    return _Breakaways(torques, steps, rows.astype(np.int64))
+    return torques, steps, rows.astype(np.int64)
