@@ -97,7 +97,8 @@ def extensions():
     headers = Path(mujoco.origin).parent / "include"
     found.append(Extension("wam_driver.fast_steps", ["wam_driver/fast_steps.c"], include_dirs=[str(headers)]))
     for extension in found:
-        extension.extra_compile_args.append("-ffp-contract=off")  # no fused operations: the bits of Python
+        # no fused operations: the bits of Python; calls within the extension need no table of addresses
+        extension.extra_compile_args += ["-ffp-contract=off", "-fvisibility=hidden"]
     return found
 
 
