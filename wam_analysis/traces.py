@@ -81,17 +81,18 @@ class Traces(NamedTuple):
     estimated: ForceSignal
     push: ForceSignal
 
-    def along(self, signal: ForceSignal, sign: float = 1.0) -> Numbers:
-        """Component along the commanded force, (k,), N; NaN if none is commanded or the link is another one.
+    def along(self, signal: ForceSignal) -> Numbers:
+        """Component of the reaction to a force along the commanded one, (k,), N.
+
+        NaN if none is commanded or the link is another one.
 
         Parameters
         ----------
-        signal : one of these traces.
-        sign : -1 for a force of the world on the arm, to make it one of the arm on the world.
+        signal : force of the world on the arm, one of these traces.
         """
         size = self.commanded.size
         direction = self.commanded.force / np.where(size > 0.0, size, NAN)[:, np.newaxis]
-        component: Numbers = sign * np.sum(signal.force * direction, axis=1)
+        component = -np.sum(signal.force * direction, axis=1)
         component[signal.acts & (signal.frame != self.commanded.frame)] = NAN
         return component
 
@@ -131,7 +132,7 @@ class Traces(NamedTuple):
         return (self.stamp >= begin) & (self.stamp < end)
 
 
-def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold] = ()) -> Traces:
+def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold]) -> Traces:
     """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded.
 
     That is the estimated one, which has a message in every outer period; a program need not command a force in all.

@@ -111,7 +111,7 @@ def analyse(
     found = None if path.suffix.lower() in (".csv", ".tsv", ".txt") else read(path, ())
     if found is not None and not any(found.counts.values()):
         raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
-    if found is not None and not given.is_given and _is_own(found):
+    if found is not None and not any(given) and _is_own(found):
         return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
     if namespace:
         raise ValueError(

@@ -121,7 +121,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     during = traces.during(hold.begin, hold.end)
     rows = during & traces.commanded.acts & (hold.axis < 0)
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
-    true, estimated = (traces.along(signal, -1.0)[rows] for signal in (traces.true, traces.estimated))
+    true, estimated = (traces.along(signal)[rows] for signal in (traces.true, traces.estimated))
     duration = (hold.end - hold.begin) / 1e9
     signals = {"true": (time_true, true), "measured": (time, measured), "estimated": (time_true, estimated)}
     if not np.any(np.isfinite(true)):

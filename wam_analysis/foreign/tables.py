@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_analysis.foreign.clocks import BILLION, nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
-from wam_analysis.foreign.topic_map import NOTHING_GIVEN, QUANTITIES, UNITS, TopicMap, unit_of
+from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
@@ -76,7 +76,7 @@ def series_of_frame(table: Any) -> Mapping[str, Any]:
     return (table.rename_axis("time") if is_time else table).reset_index()
 
 
-def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_GIVEN) -> tuple[Bag, TopicMap]:
+def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[Bag, TopicMap]:
     """A recording of a table with 'time', s, and columns as position.JOINT, velocity.JOINT, effort.JOINT or force.x.
 
     Commands are in columns as command.position.JOINT or command.force.x.

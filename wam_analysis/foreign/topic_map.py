@@ -47,11 +47,6 @@ class TopicMap(NamedTuple):
         """Factor and shown unit of a quantity."""
         return self.units.get(quantity, (1.0, QUANTITIES[quantity][0]))
 
-    @property
-    def is_given(self) -> bool:
-        """Whether anything is given."""
-        return any(self)
-
 
 NOTHING_GIVEN = TopicMap()
 
