@@ -168,17 +168,25 @@ def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half:
     in its error: where the same angles return, neither the rest of the fit nor the halves show it.
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
+    scaled = columns / np.where(scale > 0.0, scale, 1.0)
     keep = np.ones(len(wanted), dtype=np.bool_)
+
+    def fit() -> tuple[list[int], Numbers, Numbers]:
+        """Columns that the kept samples distinguish, their factors in terms of `scale`, what is left of all samples."""
+        used = _distinct(scaled[keep], width)
+        solution = np.asarray(np.linalg.lstsq(scaled[keep][:, used], wanted[keep], rcond=None)[0], np.float64)
+        return used, solution, wanted - scaled[:, used] @ solution
+
     for _ in range(4):
         if np.count_nonzero(keep) < SHAFT.fewest_samples:
             break
-        used, solution, rest = _fit(columns, wanted, scale, keep, width)
+        used, solution, rest = fit()
         middle = float(np.median(rest[keep]))
         sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
         keep = np.abs(rest - middle) <= max(SHAFT.jump * sd, 1e-12)
-    if _distinct(columns[keep], width) != used:  # what was left out was all of one direction
-        used, solution, rest = _fit(columns, wanted, scale, keep, width)
-    a = columns[keep][:, used] / scale[used]
+    if _distinct(scaled[keep], width) != used:  # what was left out was all of one direction
+        used, solution, rest = fit()
+    a = scaled[keep][:, used]
     products = a.T @ a
     inverse = np.linalg.pinv(products)
     freedom = max(len(a) / width - len(used), SHAFT.freedom)
@@ -192,16 +200,6 @@ def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half:
     errors = np.hypot(errors, SHAFT.neglected * found)
     left = float(np.sqrt(np.mean(rest[keep] ** 2)))
     return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
-
-
-def _fit(
-    columns: Numbers, wanted: Numbers, scale: Numbers, keep: Mask, width: int
-) -> tuple[list[int], Numbers, Numbers]:
-    """Columns that the kept samples distinguish, their factors in terms of `scale`, and what is left of all samples."""
-    used = _distinct(columns[keep], width)
-    scaled = columns[:, used] / scale[used]
-    solution = np.asarray(np.linalg.lstsq(scaled[keep], wanted[keep], rcond=None)[0], np.float64)
-    return used, solution, wanted - scaled @ solution
 
 
 def _distinct(columns: Numbers, width: int) -> list[int]:
