@@ -157,21 +157,16 @@ def decompress(place: ChunkPlace, record: bytes, into: Bytes, zstd: zstandard.Zs
     described = chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size
     if described != (place.first, place.last, place.size):
         raise Damage(f"{where} and its index differ")
-    data = _decompressed(chunk.compression, chunk.data, len(into) + 1, zstd)
+    data, most = chunk.data, len(into) + 1  # the library's own decompression allocates what the data ask for
+    if chunk.compression == "zstd":
+        with zstd.stream_reader(data) as stream:
+            data = stream.read(most)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
+    elif chunk.compression:
+        raise Damage(f"a chunk is compressed with {chunk.compression!r}; 'zstd', 'lz4' and none are read")
     if len(data) != len(into):
         raise Damage(f"{where} holds {len(data)} bytes, or more, instead of {len(into)}")
     if chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data):
         raise Damage(f"{where} does not match its checksum")
     into.data[:] = data
-
-
-def _decompressed(compression: str, data: bytes, most: int, zstd: zstandard.ZstdDecompressor) -> bytes:
-    """So many bytes of a chunk at most; the library's own decompression allocates what the data ask for."""
-    if compression == "":
-        return data
-    if compression == "zstd":
-        with zstd.stream_reader(data) as stream:
-            return stream.read(most)
-    if compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
-    raise Damage(f"a chunk is compressed with {compression!r}; 'zstd', 'lz4' and none are read")

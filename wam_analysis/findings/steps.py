@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Section, stated
-from wam_analysis.findings.held_force import HeldForce
 from wam_analysis.held_messages import by_names, joint_angles, row_at
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, TOUCH
@@ -90,8 +89,7 @@ def verdict(recording: AnalysedRecording) -> tuple[VerdictAnswer, ...]:
 def _answers(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     if errors := _posture_errors(recording):
         yield _posture_verdict(errors)
-    if (brief := _brief(recording)) or recording.held:
-        yield _force_verdict(recording.held, brief)
+    yield from _force_verdict(recording)
     yield from _command_verdict(recording)
     if recording.contacts or recording.touched:
         yield _link_verdict(recording)
@@ -149,23 +147,22 @@ def _posture_errors(recording: AnalysedRecording) -> dict[str, float]:
     return errors
 
 
-def _brief(recording: AnalysedRecording) -> int:
-    """How many steps commanded a force too briefly for a hold."""
-    traces, holds = recording.traces, recording.holds
+def _force_verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
+    """Whether each force was reached; nothing where none was commanded."""
+    traces, held, holds = recording.traces, recording.held, recording.holds
     pressed = [one for one in recording.steps if np.any(traces.during(one.begin, one.end) & traces.commanded.acts)]
-    return sum(not any(hold.begin < step.end and step.begin < hold.end for hold in holds) for step in pressed)
-
-
-def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
+    # steps that commanded a force too briefly for a hold
+    brief = sum(not any(hold.begin < step.end and step.begin < hold.end for hold in holds) for step in pressed)
     question = f"force within {HOLD.force_tolerance:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [one for one in held if not one.hold.is_refused]
     if len(done) < len(held):
-        return VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} not applied")
-    errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
-    answer = _answer(question, errors, HOLD.force_tolerance, "{} %")
-    short = brief + sum(one.hold.is_short for one in done)
-    return answer._replace(remark=f"{short} of {len(held) + brief} forces shorter than {STEADY:g} s" * bool(short))
+        yield VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} not applied")
+    elif held or brief:
+        errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
+        short = brief + sum(one.hold.is_short for one in done)
+        remark = f"{short} of {len(held) + brief} forces shorter than {STEADY:g} s" * bool(short)
+        yield _answer(question, errors, HOLD.force_tolerance, "{} %")._replace(remark=remark)
 
 
 def _command_verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:

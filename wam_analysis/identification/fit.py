@@ -137,7 +137,7 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     for i, name in enumerate(shared.arm.motors.names):
         own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
         best.without[:, own] += np.outer(off[:, i], slope[i, own])
-    uncertainty = _uncertainty(sought, best, moved, _unknown_torques(regressor, best.values))
+    uncertainty = _uncertainty(regressor, best, moved)
     tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
     return _result(sought, best, chosen, uncertainty, tracked)
 
@@ -216,25 +216,23 @@ def _rms(left: Numbers, is_used: Mask) -> Numbers:
     return np.sqrt((left**2 * is_used).sum(0) / counts)
 
 
-def _unknown_torques(regressor: Regressor, values: Numbers) -> Numbers:
-    """Torques of the motors, (k, n, u), by one standard deviation of what the equations leave out.
+def _uncertainty(regressor: Regressor, best: _Estimate, moved: Numbers) -> Uncertainty:
+    """Of the estimate: also by what the law of friction and the equations leave out, and what averaging moves.
 
-    That is the asymmetry of the joints' load friction, and the friction of own joints as a load: it adds to the load of
-    its motor's friction or takes from it, by the way of the load.
+    The equations leave out the asymmetry of the joints' load friction, and the friction of own joints as a load: it
+    adds to the load of its motor's friction or takes from it, by the way of the load.
     """
-    asymmetry = IDENTIFY.asymmetry * values[regressor.unknowns.places("joints.load")]
+    sought, equations, values = regressor.unknowns, best.equations, best.values
+    variance = np.zeros(len(values))
+    coulomb = [i for way in DIRECTIONS for i in sought.places(f"motors.coulomb_{way}")]
+    variance[coulomb] = (IDENTIFY.law * values[coulomb]) ** 2
+    white = np.asarray(np.linalg.inv(best.information + sought.prior), np.float64)
+    # torques of the motors, (k, n, u), by one sd of each that is left out, and what the estimate takes for them
+    asymmetry = IDENTIFY.asymmetry * values[sought.places("joints.load")]
     carried = regressor.carried_friction(values)
     carried = carried[..., None] * np.eye(carried.shape[1])
-    return np.concatenate((regressor.asymmetric_loads(values) * asymmetry, carried), axis=2)
-
-
-def _uncertainty(sought: Unknowns, best: _Estimate, moved: Numbers, unknown: Numbers) -> Uncertainty:
-    equations, variance = best.equations, np.zeros(len(sought.names))
-    coulomb = [i for way in DIRECTIONS for i in sought.places(f"motors.coulomb_{way}")]
-    variance[coulomb] = (IDENTIFY.law * best.values[coulomb]) ** 2
-    white = np.asarray(np.linalg.inv(best.information + sought.prior), np.float64)
-    # what the estimate takes for other parameters, were there one sd of the unknown torques
-    weighted = equations.columns * _weights(equations, best.values)[..., None]
+    unknown = np.concatenate((regressor.asymmetric_loads(values) * asymmetry, carried), axis=2)
+    weighted = equations.columns * _weights(equations, values)[..., None]
     taken = white @ np.einsum("knp,knj->pj", weighted, unknown, optimize=True)
     return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
 
