@@ -62,8 +62,8 @@ class ForceLoopNode:
     def step(self, inputs: Inputs) -> Outputs:
         """One outer period."""
         command, posture, torque = (
-            inputs[topic] for topic in ("force_command", "joint_posture_command", "joint_torque_command")
-        )
+            inputs["force_command"], inputs["joint_posture_command"], inputs["joint_torque_command"]
+        )  # fmt: skip
         task, joints = self._task(inputs["task_command"]), inputs["joint_states"]
         if inputs["joint_trajectory"] is not None or self._is_on_trajectory:
             posture = self._on_trajectory(inputs)
@@ -148,7 +148,7 @@ class ForceLoopNode:
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             unit = " N" if command and not (torque or task) else ""
             commanded = f"; commanded: {', '.join(map(brief, values))}{unit}" if values else ""
-        events = by_seriousness([*events, *refusals.values()])
+            events = by_seriousness([*events, *refusals.values()])
         # the numbers of an event change in every period
         subjects = [event.subject for event in events]
         present = report, list(refusals), subjects, self._loop.is_advised, commanded
