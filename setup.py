@@ -46,6 +46,7 @@ COMPILED = (
     "wam_control/contact/model_errors.py",
     "wam_control/contact/momentum_observer.py",
     "wam_control/task/motion.py",
+    "wam_control/task/scenario.py",
     "wam_control/contact/shaft_friction.py",
     "wam_control/velocity/transform.py",
     "wam_control/contact/velocity_fit.py",

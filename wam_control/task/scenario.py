@@ -192,10 +192,11 @@ class Scenario:
     ) -> None:
         require(isinstance(steps, Sequence), f"steps is {steps!r}; it must be a list of ScenarioStep")
         require(len(steps) > 0, "the scenario has no steps")
-        for i, step in enumerate(steps):
+        given: Sequence[Any] = steps
+        for i, step in enumerate(given):
             require(isinstance(step, ScenarioStep), f"step {i + 1} is {step!r}; give a ScenarioStep")
         if shared is not None:
-            steps = [_checked(f"step {i + 1}", step, shared, controllers) for i, step in enumerate(steps)]
+            steps = [_checked(f"step {i + 1}", step, shared, controllers) for i, step in enumerate(given)]
         self.steps, self._shared = list(steps), shared
         self._covers = shared.arm.covers if shared else None
         self._motion: Motion | None = None
@@ -531,7 +532,7 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
     return _checked(where, step, shared)
 
 
-def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any] = NONE) -> ScenarioStep:
+def _checked(where: str, step: Any, shared: Shared, controllers: Mapping[str, Any] = NONE) -> ScenarioStep:
     """A step of a file or made in Python, as it is played."""
     _require_step(where, step, shared)
     task, settings = step.task, checked_settings(where, step.settings, shared, controllers)
@@ -543,8 +544,8 @@ def _require_one(where: str, keys: Sequence[str]) -> None:
     require(len(keys) <= 1, f"{where}: {' and '.join(keys)} are given; give one of them")
 
 
-def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
-    """Refuse a step whose values cannot be, whether it is from a file or made in Python."""
+def _require_step(where: str, step: Any, shared: Shared) -> None:
+    """Refuse a step whose values cannot be, whether it is from a file or made in Python: they may be of any type."""
     arm = shared.arm
     for key, kind in PARTS.items():
         if (part := getattr(step, key)) is not None or kind is ForceCommand:
@@ -591,7 +592,7 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
         _require_push(where, step.push, shared, seconds)
 
 
-def _require_trajectory(where: str, trajectory: PosturePath, arm: Arm) -> None:
+def _require_trajectory(where: str, trajectory: Any, arm: Arm) -> None:
     require_list(where, "points of the trajectory", trajectory.points, "PathPoint")
     require(len(trajectory.points) > 0, f"{where}: the trajectory has no points; give at least one")
     for i, point in enumerate(trajectory.points):
@@ -617,7 +618,7 @@ def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
     return task_of_text(where, body["task"], arm) if "task" in body else None
 
 
-def _require_posture(where: str, given: Sequence[float], arm: Arm) -> None:
+def _require_posture(where: str, given: Any, arm: Arm) -> None:
     beyond = arm.joints.beyond(numbers(where, "posture", given, len(arm.joints.names)))
     require(not beyond, f"{where}: posture: {beyond}")
 
@@ -645,7 +646,7 @@ def _chirp(where: str, body: Any) -> Chirp:
     return Chirp(*(body[key] for key in CHIRP_KEYS))
 
 
-def _require_chirp(where: str, chirp: Chirp) -> None:
+def _require_chirp(where: str, chirp: Any) -> None:
     _, start, end = (number(where + ", chirp", key, value) for key, value in zip(CHIRP_KEYS, chirp, strict=True))
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
     require(
@@ -662,7 +663,7 @@ def _push(where: str, body: Any, seconds: Any) -> Push:
     return Push(cover, place, newtons, body.get("begin", 0.0), body.get("end", seconds))
 
 
-def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:
+def _require_push(where: str, push: Any, shared: Shared, seconds: float) -> None:
     covers = shared.arm.covers
     require(
         is_one_of(push.cover, covers.names), f"{where}: cover is {push.cover!r}; allowed: {', '.join(covers.names)}"
@@ -679,5 +680,5 @@ def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> Non
         f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
         f"{seconds:g} s of the step; a push ends with its step: to continue it, give it again in the next step",
     )
-    excess = shared.push_excess(push.force, push.torque(covers))
+    excess = shared.push_excess(push.force, plain(push).torque(covers))
     require(not excess, f"{where}: push: {excess}")
