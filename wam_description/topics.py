@@ -63,8 +63,8 @@ FORCE_AXIS: Final = {  # columns of the table, and what they mean
     "doubt": "predicted force error divided by the tolerated force error",
     "tolerance": "tolerated force error, N",
     "torques": "part of the predicted force error by errors of the measured torques, N",
-    "friction": "part by friction of the surface, N",
-    "place": "part by the error of the contact position, N",
+    "friction": "part by friction of the surface, and by other forces of a task, N",
+    "place": "part by the error of the contact position, or of the link, N",
     "resting": "part by external torques from before the touch, N",
     "moving_surface": "part by the lag of the force behind a moving surface, N",
     "slow_arm": "N; infinite if the arm would reach the force too slowly, else 0",
@@ -229,7 +229,7 @@ TOPICS: Final = (
     _joints(
         "joint_effort_command",
         "outer",
-        "feed-forward torque without gravity, N m; acts only together with a velocity command",
+        "torque without gravity, N m; acts only together with a velocity command, which may be empty",
     ),
     _motors("motor_velocity_command", "outer", "motor velocities, rad/s; an empty velocity array commands torque only"),
     _motors("motor_effort_command", "outer", "feed-forward torque with gravity, N m"),
@@ -289,7 +289,7 @@ TOPICS: Final = (
         "external_torque_zero",
         "outer",
         "effort = torques of the joint sensors that count as zero force, N m. They are set by `wam call tare` and when "
-        "a force begins. The estimator corrects the arm's weight with them",
+        "a force begins. The estimator corrects its modelled masses with them",
     ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
@@ -357,8 +357,8 @@ TOPICS: Final = (
         "sim/disturbance",
         WRENCH,
         "outer",
-        "a push: force and torque at the origin of the cover frame_id, N and N m. There is one push at a time; it ends "
-        "`ages.command` after the last message, or with a push on another cover",
+        "a push: force and torque at the origin of the cover that is the frame, N and N m. There is one push at a "
+        "time; it ends `ages.command` after the last message, or with another push",
     ),
     Topic("robot_description", STRING, "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node; each node latches its own"),

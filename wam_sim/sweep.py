@@ -62,8 +62,8 @@ class SweepResult(NamedTuple):
     force_peak : largest true force, N.
     unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; and those
         whose force another link hides, which bears more; '' for none.
-    reported : steps that count as carried out, and what the force loop reported at the end of each: where the position
-        of a force had to be assumed, for example, the measured force is not the true one; '' for nothing.
+    reported : parameters that the guard lowered; steps that count as carried out, and what the force loop reported at
+        the end of each: the measured force may not be the true one; '' for nothing.
     """
 
     failure: str
@@ -160,7 +160,9 @@ def outcome(point: SweepPoint) -> SweepResult:
     found = [failure, *unmet_in_words(reactions, others)]
     measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
     brief = filter(None, (measured.unassessed, _unassessed(point.configuration, reactions, played)))
-    reports = (f"{one.name}: {why.name}" for one in played if one.step.commands_arm for why in doubts(reactions, one))
+    lowered = getattr(run.nodes.get(FORCE_LOOP), "lowered", "")
+    reports = [f"the guard lowered it; used: {lowered}"] * bool(lowered)
+    reports += [f"{one.name}: {why.name}" for one in played if one.step.commands_arm for why in doubts(reactions, one)]
     return measured._replace(unassessed="; ".join(dict.fromkeys(brief)), reported="; ".join(dict.fromkeys(reports)))
 
 

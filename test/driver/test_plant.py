@@ -7,16 +7,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from arms import (
-    LINK_INERTIA,
-    NOWHERE,
-    WAM,
-    box,
-    changed,
-    frictionless,
-    ideal_plant,
-    one_joint,
-)
+from arms import LINK_INERTIA, NOWHERE, WAM, box, changed, frictionless, ideal_plant, one_joint
 from contact_truth import cover_frame, frame, motor_from_joint, torques
 
 from wam_description.arm import Arm

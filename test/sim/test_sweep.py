@@ -112,7 +112,9 @@ steps:
 
 
 @pytest.mark.slow
-def test_a_sweep_names_a_force_that_is_uncertain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_names_a_lowered_gain_and_an_uncertain_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """15 N along base -z, 36 deg off the normal of the link."""
     file = tmp_path / "inclined.yaml"
     file.write_text("""
@@ -123,15 +125,17 @@ steps:
   - {name: press, seconds: 3.0, force: {frame: base, newtons: [0.0, 0.0, -15.0]}}
 """)
     table = tmp_path / "table.csv"
-    words = ["--set", "force_loop:limits.doubt=9.0", "--vary", "arm.payload=0.0", "--scenario", str(file)]
+    words = ["--set", "force_loop:limits.doubt=9.0", "--vary", "force_loop:force_gain=0.3", "--scenario", str(file)]
     with pytest.raises(SystemExit, match="0"):
         main(["sweep", str(table), *words, "--results", str(tmp_path / "kept.jsonl")])
     with table.open() as stream:
         (row,) = csv.DictReader(stream)
     assert row["failure"] == ""
-    assert row["reported"] == "press: refused"
+    lowered, _, why = row["reported"].partition("; press: ")
+    assert lowered.startswith("the guard lowered it; used: force_gain [0.")
+    assert why == "refused"
     assert float(row["force_worst"]) > 1.0
-    assert "1 set, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
+    assert "1 set, 0 failed, 1 with a remark (column reported)" in capsys.readouterr().out
 
 
 @pytest.mark.slow

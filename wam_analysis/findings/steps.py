@@ -192,7 +192,7 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     errors = [100.0 * abs(one.position_error) for _, one in found if not one.is_lower_bound]
     errors += [math.nan] * sum(one.lasts for one in recording.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
-    unknown = [str(number) for number, one in found if one.is_lower_bound]
+    unknown = [f"{number} ({one.link})" for number, one in found if one.is_lower_bound]
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{} cm")
     return answer._replace(remark=f"not known for contact {', '.join(unknown)}" * bool(unknown))
 

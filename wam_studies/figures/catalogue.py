@@ -83,7 +83,7 @@ def table(found: dict[str, Panels]) -> str:
         for name, values in found.items()
         for part, distance in distances(values).items()
     ]
-    return markdown(("figure", "points", "greatest distance from the line"), rows)
+    return markdown(("figure", "part", "greatest distance from the line"), rows)
 
 
 def percent(distance: float) -> str:

@@ -86,7 +86,7 @@ def _outside(run: Recording, step: Step, label: str, position: float) -> Compari
     low, high = columns["low"][here], columns["high"][here]
     beyond = np.maximum(np.maximum(low - position, position - high), 0.0)
     outside = float(np.median(np.nan_to_num(beyond, nan=np.inf))) if len(low) else math.inf
-    return below(f"{label}, outside the stated set", outside, "m", BOUNDS.outside_set, "90 % set")
+    return below(f"{label}, beyond the 90 % set", outside, "m", BOUNDS.outside_set, "90 % set")
 
 
 def along(run: Recording) -> Along:
@@ -141,7 +141,7 @@ def pushed(runs: Runs) -> Result:
         raise BagError(f"{run.bag.path}: the push on {push.link} was not detected")
     force, place = (found.true_force, found.force), (found.true_position, found.position)
     rows = [
-        below("false detections", analysed.traces.false_seconds, "s", BOUNDS.latency, "chapter 2"),
+        below("time of false detections", analysed.traces.false_seconds, "s", BOUNDS.latency, "chapter 2"),
         below("detection latency", found.latency, "s", BOUNDS.latency, "chapter 2"),
         near(f"detection on {push.link}, part of its time", 1.0, push.right, "", "chapter 2", BOUNDS.wrong_link),
         near("force, median", *force, "N", "chapter 2", BOUNDS.push_in_motion),

@@ -31,7 +31,7 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     rows = [near("deadband, F_des at which F_c begins", friction, begin - BOUNDS.least_contact, "N", "5.2")]
     for step in run.steps:
         last = int(np.searchsorted(shown.time, step.end)) - 1
-        rows.append(near(f"F_c at {desired[last]:.0f} N, {step.name}", expected[last], force[last], "N", "5.2"))
+        rows.append(near(f"{step.name}, F_c at {desired[last]:.0f} N", expected[last], force[last], "N", "5.2"))
     worst = float(np.abs(force - expected).max() / expected.max())
     rows.append(below("largest difference", worst, "of F_c", BOUNDS.within, "5.2"))
     each = slice(None, None, 40)

@@ -55,7 +55,7 @@ def _cycling(shown: TestbedStep, level: float) -> list[Comparison]:
     period = quantised_cycle_period(link.loop.gain, k_tr, friction, desired * link.lever, level * link.lever)
     return [
         near("friction, cycle of the motor", 2.0 * friction / k_tr, cycle.peak_to_peak, "rad", "(5.20)", within),
-        near("friction, its period, which stays", period, cycle.period, "s", "(5.3)", within),
+        near("friction, its constant period", period, cycle.period, "s", "(5.3)", within),
         below("friction, error of F_c", float(shown.force[there].mean()) - desired, "N", level, "a step"),
     ]
 
