@@ -12,6 +12,7 @@ from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, id
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers
+from wam_bag.columns import JOINT_FIELDS
 
 RECORD = (
     "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
@@ -112,20 +113,12 @@ def contradiction(source: Source) -> str:
             f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "
             "sign"
         )
-    unit = source.units["position"]
-    for piece in pieces(source, "position", "velocity"):
-        if (lost := _lost_way(piece)) is not None:
-            begin, moved, by = lost
-            return (
-                f"within {SHAFT.way:g} s from {begin:.4g} s on the position moved by {shown(moved, unit)}, but by the "
-                f"recorded velocity by {shown(by, unit)}; an encoder slips or stops, or one of the two is of "
-                "something else"
-            )
-    return ""
+    lost = (_lost_way(piece, source.units["position"]) for piece in pieces(source, "position", "velocity"))
+    return next(filter(None, lost), "")
 
 
-def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
-    """Where the position moves least as the velocity has it: when, by how much each; None where they agree.
+def _lost_way(piece: Piece, unit: str) -> str:
+    """Where the position moves least as the velocity has it, and by how much each; '' where they agree.
 
     A velocity that is late differs only as far as it changes meanwhile.
     """
@@ -133,16 +126,20 @@ def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
     period = float(time[1] - time[0])
     width = max(1, round(SHAFT.way / period))
     if len(time) <= width:
-        return None
+        return ""
     moved, by = ways(piece, width)
     path = np.concatenate(([0.0], np.cumsum(np.abs(0.5 * period * (velocity[1:] + velocity[:-1])))))
     far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
     allowed = SHAFT.agree * far + SHAFT.longest_effort_lag * np.abs(change) + SHAFT.joint_rest * SHAFT.way
     excess = np.abs(moved - by) - allowed - SHAFT.noisy * piece.noise["position"]
     if 2 * np.sum(excess > 0.0) < width:
-        return None
+        return ""
     worst = int(np.argmax(excess))
-    return float(time[worst]), float(moved[worst]), float(by[worst])
+    return (
+        f"within {SHAFT.way:g} s from {time[worst]:.4g} s on the position moved by {shown(moved[worst], unit)}, but by "
+        f"the recorded velocity by {shown(by[worst], unit)}; an encoder slips or stops, or one of the two is of "
+        "something else"
+    )
 
 
 def _is_known(found: Friction) -> bool:
@@ -163,7 +160,7 @@ def friction(source: Source) -> tuple[Friction, float]:
     of the effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the
     inertia is NaN; so are viscous friction and lag, and no lag is looked for.
     """
-    needed = [q for q in ("position", "velocity", "effort") if q in source.values]
+    needed = [q for q in JOINT_FIELDS if q in source.values]
     if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
         source, needed = loaded, ["velocity", "effort"]
     some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
@@ -176,7 +173,7 @@ def friction(source: Source) -> tuple[Friction, float]:
     blank = np.full(apart, math.nan)
     joined = {
         q: np.concatenate([part for piece in some for part in (piece.values[q], blank)])
-        for q in ("position", "velocity", "effort")
+        for q in JOINT_FIELDS
         if q in some[0].values
     }
     velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)

@@ -10,8 +10,7 @@ from wam_analysis.foreign.clocks import BILLION, nanoseconds
 from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
-from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
-from wam_bag.columns import UNNAMED, joint_columns
+from wam_bag.columns import JOINT_FIELDS, UNNAMED, joint_columns
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
@@ -21,7 +20,7 @@ OF_POINT = {"position": "positions", "velocity": "velocities", "effort": "effort
 FIELDS = {  # of the types that are known: suffix of the topic, and fields by quantity
     JOINTS: [("", {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"})],
     WRENCH: [("", {"force": "wrench.force", "torque": "wrench.torque"})],
-    INTERFACES: [("", {"name": "joint_names", **{q: f"interface_values.{q}" for q in IN_JOINTS}})],
+    INTERFACES: [("", {"name": "joint_names", **{q: f"interface_values.{q}" for q in JOINT_FIELDS}})],
     CONTROLLER: [
         (suffix, {"name": "joint_names", **{q: f"{point}.{own}" for q, own in OF_POINT.items()}})
         for point, suffix in POINTS.items()
@@ -64,7 +63,7 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
     types = dict(bag.types)
     for name, columns in bag.topics.items():
         for part, found in _mapped(name, bag.types[name], columns, given):
-            if part in topics and not any(getattr(found, q).size for q in IN_JOINTS):
+            if part in topics and not any(getattr(found, q).size for q in JOINT_FIELDS):
                 continue  # names that a controller of this version leaves empty
             topics[part] = _scaled(found, given)
             is_command = part in given.commands or (bag.types[name] == CONTROLLER and part != name)
@@ -98,7 +97,7 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
         yield topic, columns
     elif columns.messages:
         for suffix, fields in _fields(kind, columns.messages[0], given):
-            has_joints, has_wrench = any(q in fields for q in IN_JOINTS), "force" in fields or "torque" in fields
+            has_joints, has_wrench = any(q in fields for q in JOINT_FIELDS), "force" in fields or "torque" in fields
             if not has_joints and not has_wrench:
                 raise ValueError(f"{topic} is of type {kind}; name its fields, for example --map position=FIELD")
             if has_joints:
@@ -190,11 +189,11 @@ def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
 
 
 def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> JointColumns:
-    taken = {q: _numbers(topic, columns, fields[q]) for q in IN_JOINTS if q in fields}
+    taken = {q: _numbers(topic, columns, fields[q]) for q in JOINT_FIELDS if q in fields}
     times, frames = _times(topic, columns, fields, given), _frames(columns)
     alike: dict[Any, list[int]] = {}  # rows by frame, names and lengths of the fields
     for k, message in enumerate(columns.messages):
-        widths = tuple(len(taken[q][k]) if q in taken else 0 for q in IN_JOINTS)
+        widths = tuple(len(taken[q][k]) if q in taken else 0 for q in JOINT_FIELDS)
         fitting = given.joints if len(given.joints) == max(widths) else ()
         named = _at(topic, message, fields["name"]) if "name" in fields else fitting
         names = tuple(map(str, np.atleast_1d(named).tolist()))  # a single one, and numbers of motors, too
@@ -203,7 +202,7 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
         alike.setdefault((frames[k], names, widths), []).append(k)
     groups = []
     for (frame, names, _), rows in alike.items():
-        values = [np.array([taken[q][k] if q in taken else () for k in rows], np.float64) for q in IN_JOINTS]
+        values = [np.array([taken[q][k] if q in taken else () for k in rows], np.float64) for q in JOINT_FIELDS]
         groups.append((np.array(rows), (times[rows], frame, names, values)))
     found = joint_columns(columns.log_time_ns, groups)
     return found if "name" in fields else found._replace(irregular={})
