@@ -42,7 +42,7 @@ class DriverParameters:
         "age of the last command at which the driver stops the arm with a fault", "s", low=0.002, high=0.05
     )
     late_periods: float = parameter(
-        "in realtime: fraction of the newest 2000 periods that may be late when the brakes are released",
+        "in realtime: fraction of late periods in the newest 2000 above which `enable` is refused",
         high=1.0,
     )
     brake_torque: float = parameter(
@@ -52,7 +52,7 @@ class DriverParameters:
         high=1e3,
     )
     cover_speed_limit: float = parameter(
-        "speed of the end of a cover nearer the base, above which the driver faults",
+        "speed of the base-side end of a cover, above which the driver faults",
         "m/s",
         high=100.0,
     )

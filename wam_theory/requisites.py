@@ -257,8 +257,8 @@ def _bandwidth(m: Measures) -> list[Requisite]:
 def _slenderness(m: Measures) -> list[Requisite]:
     name = "high aspect ratio"
     rows = [
-        _row(name, f"length / width, link {i}", ratio, "", "at least", required, "7.2.1")
-        for i, (ratio, required) in enumerate(zip(m.aspect_ratio, m.aspect_required, strict=True), 1)
+        _row(name, f"length / width, {link} link", ratio, "", "at least", required, "7.2.1")
+        for link, ratio, required in zip(("inner", "outer"), m.aspect_ratio, m.aspect_required, strict=True)
     ]
     worst = min(m.aspect_ratio)
     grasp = float(useful_length(worst, secure_angle(m.cover_friction)))

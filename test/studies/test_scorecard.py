@@ -164,7 +164,7 @@ def test_coupled_bandwidth_is_the_least_of_the_arm_whose_rotors_are_free(
         ({"friction_share": (0.014, 0.02, 0.01, 0.01)}, "peak torque / friction, joint 2"),
         ({"cable_tension": 1.1}, "greatest cable tension"),
         ({"pretension": 0.9}, "pretension"),
-        ({"aspect_ratio": (5.0, 8.0)}, "length / width, link 2"),
+        ({"aspect_ratio": (5.0, 8.0)}, "length / width, outer link"),
         ({"efficiency": 0.9}, "limiting efficiency"),
         ({"rotor_inertia": (0.01, 0.01, 9.0, 0.01)}, "rotors' inertia / link's inertia, joint 3"),
     ],

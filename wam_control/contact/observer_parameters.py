@@ -63,7 +63,7 @@ class ObserverParameters:
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
     motor_torque_fraction: float = parameter("further sd of the motor torques, as a fraction of the torque", high=1.0)
     motor_noise: float = parameter(
-        "sd of the torque of a moving motor at the start, as a fraction of dynamic friction; afterwards it is tracked",
+        "initial sd of the torque of a moving motor, as a fraction of dynamic friction; then it is tracked",
         high=10.0,
     )
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6, high=100.0)

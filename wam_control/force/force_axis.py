@@ -50,20 +50,20 @@ class SensingParameters:
     )
     zero_limit: float = parameter(
         "largest external torque of a joint that the loop takes as zero when a force begins at rest without a "
-        "detected contact; 0: none",
+        "detected contact; 0: no torque",
         "N m",
         high=1e3,
         live=True,
     )
     least_apparent_mass: float = parameter(
-        "smallest apparent mass of the arm with which forces are measured; 0: no bound. Without a bound, the largest "
-        "stable gain and the error of oblique forces are smaller",
+        "smallest apparent mass of the arm that the weights of the joint torques may give a measured force; 0: no "
+        "bound. Without a bound, the largest stable gain and the error of oblique forces are smaller",
         "kg",
         high=100.0,
         live=True,
     )
     apparent_mass_limit: float = parameter(
-        "largest apparent mass; along directions with a larger apparent mass the motion is slower; 0: no limit",
+        "apparent mass above which the motion along a direction is slower; 0: no limit",
         "kg",
         high=1e6,
         live=True,

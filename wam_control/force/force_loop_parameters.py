@@ -78,13 +78,13 @@ class LimitParameters:
         live=True,
     )
     surface_speed: float = parameter(
-        "largest speed of the surface along the force; the force lags behind the motion, which counts as an error",
+        "expected speed of the surface along the force; the force lags behind the motion, which counts as an error",
         "m/s",
         high=10.0,
         live=True,
     )
     slide_speed: float = parameter(
-        "largest speed of the surface across the force; a sloping surface then also moves along the force, which "
+        "expected speed of the surface across the force; a sloping surface then also moves along the force, which "
         "counts as an error",
         "m/s",
         high=10.0,
@@ -119,7 +119,7 @@ class ForceLoopParameters:
         "G_P of each axis (5.23), or one for all: position per force error", "m/N", high=100.0, live=True
     )
     force_error_limit: tuple[float, ...] = parameter(
-        "saturation of F_error of each axis, or one for all; above the deadband", "N", live=True
+        "saturation of F_error of each axis, or one for all; it must exceed the deadband", "N", live=True
     )
     force_deadband: tuple[float, ...] = parameter(
         "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3, live=True
@@ -132,7 +132,7 @@ class ForceLoopParameters:
         "G_P of each joint, or one for all", "rad/(N m)", high=100.0, live=True
     )
     torque_error_limit: tuple[float, ...] = parameter(
-        "saturation of the torque error of each joint, or one for all; above the deadband", "N m", live=True
+        "saturation of the torque error of each joint, or one for all; it must exceed the deadband", "N m", live=True
     )
     torque_deadband: tuple[float, ...] = parameter(
         "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3, live=True
@@ -166,7 +166,7 @@ class ForceLoopParameters:
     )
     contact_source: str = parameter(
         "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
-        "enough. The torque of a force command in a cover's frame pins the position in both cases",
+        "enough. If a force command in a cover's frame has a torque, this gives the position in both cases",
         choices=("estimated", "pinned"),
         live=True,
     )

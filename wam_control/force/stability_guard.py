@@ -49,7 +49,7 @@ class GuardParameters:
         "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0, live=True
     )
     stability_fraction: float = parameter(
-        "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0, live=True
+        "accepted fraction of the largest gain that is stable without friction", low=0.05, high=1.0, live=True
     )
     feedback_lag: float = parameter(
         "time constant of the estimated force, with feedback contact_estimate", "s", high=10.0, live=True

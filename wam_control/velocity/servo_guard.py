@@ -33,7 +33,7 @@ class ServoGuardParameters:
         choices=("off", "refuse"),
     )
     stability_fraction: float = parameter(
-        "fraction of the largest stable gains that is accepted, for commands on time",
+        "accepted fraction of the largest gains that are stable without extra_delay",
         low=0.05,
         high=1.0,
     )
