@@ -275,7 +275,7 @@ TOPICS: Final = (
         "measured force of the arm on the world, along the commanded direction, N",
         is_viewed=True,
     ),
-    Topic("force_error", WRENCH, "outer", "F_error, commanded minus measured force, before saturation, N"),
+    Topic("force_error", WRENCH, "outer", "F_error, desired minus measured force, before saturation, N"),
     Topic("force_error_limited", WRENCH, "outer", "F_error after saturation, N"),
     Topic(
         "force_axis",

@@ -71,7 +71,7 @@ def sweeping(runs: Runs) -> Result:
     rows = [
         Comparison("objects that move with the link", float(len(objects)), float(moved), "", 0.0, "all"),
         noted("angle about the base over all objects, before", before, "rad"),
-        below("angle over all objects, after / before", after / before, "", BOUNDS.together, "together"),
+        below("angle about the base over all objects, after / before", after / before, "", BOUNDS.together, "together"),
         below("speed of the fastest object, after", calm, "m/s", 0.01, "at rest"),
         noted("largest true force of the arm", _largest(swept), "N"),
         *_estimate(run, sweep),
