@@ -7,6 +7,7 @@
 - stack_source: a running stack as the source
 - live_page: the page of a running stack, and what it asks of the stack
 - scenario_player: a scenario or task played into a running stack
+- services: what a person asks of a stack by one word
 - hold: a topic that is published while somebody drags or presses
 - playback: a bag as the source
 - thresholds: times and sizes

@@ -18,6 +18,7 @@ from wam_description.event import Level
 from wam_description.signals import BASE, Contact, NodeStatus, Triple
 from wam_description.status import PAUSED
 from wam_description.wiring import Call, SetParameters
+from wam_live.services import SERVICES
 from wam_live.snapshot import Snapshot, size
 from wam_live.thresholds import LIVE
 
@@ -31,14 +32,10 @@ LEGEND: Final = (  # of the arrows and the range in the scene
     ("&#9646;", "likely", "90 % range of the contact position"),
     ("&#10145;", "hand", "pull of your hand"),
 )
-BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and its requests
-    "arm": {"Enable": (Call("driver", "enable", True),), "Brake": (Call("driver", "enable", False),)},
-    "time": {
-        "Pause": (Call("driver", "pause", True),),
-        "Step": (Call("driver", "pause", True), Call("driver", "step")),
-        "Run": (Call("driver", "pause", False),),
-    },
-    "reset": {"Fault": (Call("driver", "reset_fault"),), "Arm": (Call("driver", "reset"),)},
+BUTTONS: Final = {  # by row: label and its requests
+    "arm": {"Enable": "enable", "Brake": "disable"},
+    "time": {"Pause": "pause", "Step": "step", "Run": "resume"},
+    "reset": {"Fault": "reset_fault", "Arm": "reset"},
 }
 DOTS: Final = {Level.OK: "#2f9e44", Level.WARN: "#f08c00", Level.ERROR: "#e03131", None: "#adb5bd"}
 DITHER: Final = ("velocity_loop", "dither.level")  # 0 switches it off
@@ -157,13 +154,13 @@ class Controls:
 
     def _add_buttons(self) -> None:
         stop = self._gui.add_button("Emergency stop", hint="stop at once; 'Fault' under reset ends it", color="red")
-        stop.on_click(lambda _: self.requests.put(Call("driver", "estop")))
+        stop.on_click(lambda _: self._ask("estop"))
         for row, buttons in BUTTONS.items():
             group = self._gui.add_button_group(row, tuple(buttons))
             group.on_click(lambda event, buttons=buttons: self._ask(buttons[event.target.value]))
 
-    def _ask(self, requests: Sequence[Request]) -> None:
-        for request in requests:
+    def _ask(self, service: str) -> None:
+        for request in SERVICES[service][1]:
             self.requests.put(request)
 
     def _add_press(self, arm: Arm) -> None:

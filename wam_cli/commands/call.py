@@ -19,28 +19,14 @@ from wam_description.parameters import build_part, fields
 from wam_description.signals import Answer, Wrench
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
-from wam_description.wiring import Call, SetParameters
+from wam_description.wiring import SetParameters
 from wam_live.push import push
+from wam_live.services import SERVICES
 from wam_ros.client import START, StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
 from wam_ros.process_signals import bound_leaving
 
-SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
-    "enable": ("let the motors follow the commands", (Call("driver", "enable", True),)),
-    "disable": ("brake the arm", (Call("driver", "enable", False),)),
-    "estop": ("stop at once; the arm stays stopped until reset_fault", (Call("driver", "estop"),)),
-    "reset_fault": ("end a fault whose cause is gone", (Call("driver", "reset_fault"),)),
-    "confirm_home": ("report to the driver that a real arm is in its home pose", (Call("driver", "confirm_home"),)),
-    "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
-    "tare": ("set the measured forces to zero, while nothing touches the arm", (Call("force_loop", "tare"),)),
-    "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
-    "step": (
-        "pause, then advance the simulated arm by one period",
-        (Call("driver", "pause", True), Call("driver", "step")),
-    ),
-    "resume": ("resume the time of the simulated arm", (Call("driver", "pause", False),)),
-}
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 EXAMPLE: Final = "force_loop:force_gain=0.01"
 NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|nan)$", re.IGNORECASE)
