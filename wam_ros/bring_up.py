@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from rclpy.logging import get_logger
 
@@ -27,8 +27,43 @@ LOGGER: Final = get_logger("wam")
 NO_FAILURE: Final = (0, -signal.SIGTERM, 128 + signal.SIGTERM)
 
 
-class NodeProcess(subprocess.Popen[bytes]):
-    """Nodes of a configuration as a process, in a session of its own: Ctrl-C reaches the parent alone.
+class CommandProcess(subprocess.Popen[bytes]):
+    """A command of `wam` as a process, in a session of its own: Ctrl-C reaches the parent alone.
+
+    Parameters
+    ----------
+    words : of the command.
+    place : environment in which the process finds its processors.
+    options : as those of Popen.
+    """
+
+    def __init__(self, words: Sequence[str], place: Mapping[str, str] = MappingProxyType({}), **options: Any) -> None:
+        environment = {**os.environ, PARENT: str(os.getpid()), **place}
+        command = [sys.executable, "-m", "wam_cli.program", *words]
+        super().__init__(command, start_new_session=True, env=environment, **options)
+
+    def has_ended(self, seconds: float) -> bool:
+        """Whether it ends within this time."""
+        try:
+            self.wait(max(0.0, seconds))
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def kill(self) -> None:
+        """End it the hard way."""
+        os.killpg(self.pid, signal.SIGKILL)
+        self.wait()
+
+    def close(self, seconds: float = PROCESS_LIMITS.end) -> None:
+        """End it, the hard way where it does not end by itself within this time."""
+        self.terminate()
+        if not self.has_ended(seconds):
+            self.kill()
+
+
+class NodeProcess(CommandProcess):
+    """Nodes of a configuration as a process.
 
     Parameters
     ----------
@@ -36,7 +71,7 @@ class NodeProcess(subprocess.Popen[bytes]):
     entries : of the parameter `nodes`.
     namespace : of the nodes.
     log_level : least severity of what they print.
-    place : environment in which the process finds its processors.
+    place : as for `CommandProcess`.
 
     Attributes
     ----------
@@ -53,30 +88,9 @@ class NodeProcess(subprocess.Popen[bytes]):
     ) -> None:
         prepare_logging_directory()
         self.nodes = [declared(entry).name for entry in entries]
-        environment = {**os.environ, PARENT: str(os.getpid()), **place}
         with parameter_file(configuration) as file:
-            command = [sys.executable, "-m", "wam_cli.program", "node", *entries]
-            command += _arguments(f"/dev/fd/{file.name}", namespace, log_level)
-            super().__init__(command, start_new_session=True, env=environment, pass_fds=[int(file.name)])
-
-    def has_ended(self, seconds: float) -> bool:
-        """Whether it ends within this time."""
-        try:
-            self.wait(max(0.0, seconds))
-        except subprocess.TimeoutExpired:
-            return False
-        return True
-
-    def kill(self) -> None:
-        """End it the hard way."""
-        os.killpg(self.pid, signal.SIGKILL)
-        self.wait()
-
-    def close(self) -> None:
-        """End it, the hard way where it does not end by itself."""
-        self.terminate()
-        if not self.has_ended(PROCESS_LIMITS.end):
-            self.kill()
+            words = ["node", *entries, *_arguments(f"/dev/fd/{file.name}", namespace, log_level)]
+            super().__init__(words, place, pass_fds=[int(file.name)])
 
 
 def _arguments(file: str, namespace: str, log_level: str) -> list[str]:

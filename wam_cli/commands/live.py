@@ -3,7 +3,6 @@
 import argparse
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -145,46 +144,27 @@ def page_next_to(
         _print(f"no live page: {reason}")
         yield lambda: None
         return
-    page = PageProcess(port, namespace)
+    from wam_ros.bring_up import CommandProcess
+
+    # a process of its own can neither delay nor fail the stack
+    page = CommandProcess(["live", "--port", str(port), "--namespace", namespace], stdin=subprocess.DEVNULL)
     with ExitStack() as ending:
-        ending.callback(page.close)
-        page.wait(is_stopped)
+        ending.callback(_end, page)
+        late = time.monotonic() + LATE
+        while page.poll() is None and port_is_free(port) and not is_stopped():
+            if time.monotonic() > late:
+                _print(f"the live page is still starting; it will be at {url(port)}")
+                break
+            time.sleep(0.05)
         yield ending.close
 
 
-class PageProcess:
-    """The page as a process of its own, which can neither delay nor fail the stack."""
-
-    def __init__(self, port: int, namespace: str) -> None:
-        from wam_ros.run import PARENT
-
-        command = [sys.executable, "-m", "wam_cli.program", "live", "--port", str(port), "--namespace", namespace]
-        # a session of its own: Ctrl-C reaches the parent alone
-        self._process = subprocess.Popen(
-            command, start_new_session=True, stdin=subprocess.DEVNULL, env={**os.environ, PARENT: str(os.getpid())}
-        )
-        self._port = port
-
-    def wait(self, is_stopped: Callable[[], bool]) -> None:
-        """Wait until the page can be opened, has ended, or is LATE."""
-        late = time.monotonic() + LATE
-        while self._process.poll() is None and port_is_free(self._port) and not is_stopped():
-            if time.monotonic() > late:
-                _print(f"the live page is still starting; it will be at {url(self._port)}")
-                return
-            time.sleep(0.05)
-
-    def close(self) -> None:
-        """End the page; report one that has ended before."""
-        if self._process.poll() is not None:
-            _print("the live page ended too early; it printed the reason above")
-        else:
-            self._process.terminate()
-            try:
-                self._process.wait(PATIENCE)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+def _end(page: Any) -> None:
+    """End the process of a page; report one that has ended before."""
+    if page.poll() is not None:
+        _print("the live page ended too early; it printed the reason above")
+    else:
+        page.close(PATIENCE)
 
 
 def _print(line: str) -> None:
