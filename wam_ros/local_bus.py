@@ -10,10 +10,7 @@ and everything in realtime.  benchmarks/README.md shows the gain; the bits are t
 
 from collections import deque
 from collections.abc import Callable, Collection
-from typing import Any, Final, NamedTuple
-from weakref import WeakKeyDictionary
-
-from rclpy.context import Context
+from typing import Any, NamedTuple
 
 from wam_ros.limits import NODE_LIMITS
 
@@ -68,6 +65,3 @@ class LocalBus:
             if not waiting:
                 return
         self._executor.create_task(self._turn)
-
-
-BUSES: Final[WeakKeyDictionary[Context, LocalBus]] = WeakKeyDictionary()  # where the nodes of a context have one

@@ -8,7 +8,6 @@ from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 
 from wam_description.topics import BY_NAME, EVERY_NODE, Topic
-from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
 from wam_ros.ros_topics import qos, topic_name
 from wam_ros.run import end_of_delivery
@@ -32,7 +31,7 @@ class Outlets:
 
     def __init__(self, node: Any, rows: Sequence[Topic]) -> None:
         self._node = node
-        self.bus = BUSES.get(node.context) if node.shared.timing.mode == "lockstep" else None
+        self.bus = getattr(node.context, "bus", None) if node.shared.timing.mode == "lockstep" else None
         every = [*rows, *(BY_NAME[name] for name in EVERY_NODE)]  # on these each node publishes messages
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every

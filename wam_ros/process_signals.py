@@ -14,18 +14,12 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final
-from weakref import WeakKeyDictionary
-
-if TYPE_CHECKING:
-    from rclpy.context import Context
+from typing import Any, Final
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 LISTENER_GONE = signal.SIGUSR1  # from bring-up, before SIGTERM: a node was killed, which takes no message any more
 HELD_UP: Final = signal.SIGVTALRM  # by which the system ends a process that does not leave the network
 LONGEST: Final = 1.0  # s of computing to leave the network, a hundred times what it takes
-
-_BOUNDED: "WeakKeyDictionary[Context, Callable[[], str]]" = WeakKeyDictionary()
 
 
 def end_at_once_on_signals(last_words: str = "") -> None:
@@ -65,21 +59,21 @@ class Stop:
         self.is_set = True
 
 
-def bound_leaving(context: "Context", failure: Callable[[], str]) -> None:
+def bound_leaving(context: Any, failure: Callable[[], str]) -> None:
     """Let the system end this process where leaving the network with a context takes too long.
 
     Parameters
     ----------
-    context : of all nodes of this process.
+    context : `wam_ros.run.StackContext` of all nodes of this process.
     failure : why one of them has failed, '' where none has; a failure is to be reported, however long that takes.
     """
-    _BOUNDED[context] = failure
+    context.failure = failure
 
 
 @contextmanager
-def leaving(context: "Context") -> Iterator[None]:
+def leaving(context: Any) -> Iterator[None]:
     """What destroys a node, the last one with the participant; not its own work before."""
-    failure = _BOUNDED.get(context)
+    failure = getattr(context, "failure", None)
     if failure is None or failure():
         yield
         return

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
-from weakref import WeakKeyDictionary
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread a core for 4x4 matrices
 
@@ -23,7 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
 from wam_ros.limits import PROCESS_LIMITS
-from wam_ros.local_bus import BUSES, LocalBus
+from wam_ros.local_bus import LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
 from wam_ros.processors import keep_to_processors
@@ -55,7 +54,19 @@ def make_executor(context: Context) -> Any:
     return EventsExecutor(context=context)
 
 
-_ENDS: WeakKeyDictionary[Context, float] = WeakKeyDictionary()
+class StackContext(Context):
+    """A context of ROS with what its nodes share.
+
+    Attributes
+    ----------
+    bus : between them, in lockstep; None where there is none.
+    end : see `end_of_delivery`.
+    failure : see `bound_leaving`.
+    """
+
+    bus: LocalBus | None = None
+    end: float
+    failure: Callable[[], str]
 
 
 def end_of_delivery(context: Context) -> float:
@@ -63,7 +74,7 @@ def end_of_delivery(context: Context) -> float:
 
     There is one deadline for all of them: a listener that is frozen would hold up each node in turn.
     """
-    return _ENDS.get(context, time.monotonic() + PROCESS_LIMITS.delivery)
+    return getattr(context, "end", time.monotonic() + PROCESS_LIMITS.delivery)
 
 
 def prepare_logging_directory() -> None:
@@ -106,7 +117,7 @@ class Connection(Closing):
     def __init__(self, arguments: Sequence[str] = (), domain_id: int | None = None) -> None:
         limit_to_this_machine(os.environ)
         prepare_logging_directory()
-        self.context = Context()
+        self.context = StackContext()
         rclpy.init(
             args=list(arguments),
             context=self.context,
@@ -149,9 +160,8 @@ class Connection(Closing):
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last, and leave the network."""
-        _ENDS[self.context] = time.monotonic() + (
-            PROCESS_LIMITS.short_delivery if self.listener_gone else PROCESS_LIMITS.delivery
-        )
+        limits = PROCESS_LIMITS
+        self.context.end = time.monotonic() + (limits.short_delivery if self.listener_gone else limits.delivery)
         for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
             self.remove(node)
         self.executor.shutdown()
@@ -180,7 +190,7 @@ class Nodes(Connection):
         domain_id: int | None = None,
     ) -> None:
         super().__init__(arguments, domain_id)
-        BUSES[self.context] = LocalBus(self.executor, makers)
+        self.context.bus = LocalBus(self.executor, makers)
         self.nodes: dict[str, Any] = {}
         try:
             for name, make in makers.items():

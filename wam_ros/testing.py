@@ -28,7 +28,6 @@ from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
-from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
@@ -110,7 +109,7 @@ class RunningArm:
 
     def __init__(self, domain_id: int, folder: Path) -> None:
         self._domain_id, self._folder = domain_id, folder
-        self._composition: Composition | None = None
+        self._composition: Any = None
         self.fault = ""
         self._expected: set[str] = set()  # topics of which messages may be refused
 
@@ -156,16 +155,13 @@ class RunningArm:
         """Keep each message: as it is published where its publishers are of this process, else from the middleware."""
         rows = self.interface.topics
         self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
-        bus = BUSES[self.context] if self._is_lockstep else None
+        bus = self.context.bus if self._is_lockstep else None
         for topic, row in rows.items():
-            self._listen_to(row, self._taking(topic), bus)
-
-    def _listen_to(self, row: Topic, take: Callable[[bytes], None], bus: LocalBus | None) -> None:
-        if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(row.name)):
-            bus.subscribe(self.node.resolve_topic_name(row.name), lambda message: take(message.data))
-        else:
-            name = topic_name(self.node, row)
-            self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
+            take, name = self._taking(topic), topic_name(self.node, row)
+            if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
+                bus.subscribe(self.node.resolve_topic_name(name), lambda message, take=take: take(message.data))
+            else:
+                self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 
     def _taking(self, topic: str) -> Callable[[bytes], None]:
         kept = self._recorded.data[topic]
@@ -214,9 +210,7 @@ class RunningArm:
     def add(self, node: Any) -> Any:
         """Spin a plain rclpy node, too.  Make it with ``context=arm.context``; it ends with the test."""
         self._require_start()
-        assert self._composition is not None
-        self._composition.add(node)
-        return node
+        return self._composition.add(node)
 
     def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
         """Spin until a condition holds; it is checked once per outer period of the arm.
@@ -391,7 +385,6 @@ class RunningArm:
             self.start(configuration=playing(steps, self._folder, **start))
         elif steps or start or "scenario" not in self.configuration.shared.nodes:
             raise ValueError("the arm has been started already; call play instead of start, with its arguments")
-        assert self._composition is not None
         failure = self._composition.play()
         self.close()
         if failure:
