@@ -78,7 +78,7 @@ class DriverBench(StackClient):
     ) -> None:
         super().__init__(namespace, "velocity_loop", connection, shared)
         self.contract = DriverContract.of(shared, share)
-        self._arm, self._timing, self._current = shared.arm, shared.timing, current
+        self._current = current
         self.digests = digests(shared)
         self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
         self.carrying = [0.0] * len(self.contract.motors)
@@ -91,8 +91,7 @@ class DriverBench(StackClient):
         self.is_answering = True
         self.after: list[Callable[[int], Any]] = []
         self.wanted: Callable[[int, list[float]], Any] | None = None
-        self._session, self._spun = -1, math.inf
-        self._command = self.publisher(COMMAND)
+        self._spun = math.inf
         for topic, arrays in KEPT.items():
             self.listen(topic, partial(self._keep, topic), arrays, partial(self._refuse, topic))
         row, keep = BY_NAME[CLOCK], lambda data: self._keep(CLOCK, stamp_in(data), None)
@@ -110,18 +109,18 @@ class DriverBench(StackClient):
         self._refused = f"{topic}: {reason}"
 
     def _answer(self, stamp: int, state: State) -> None:
-        tick = stamp // self._timing.period_ns
-        if tick % self._timing.outer_divisor == 0:
+        tick = stamp // self.contract.period
+        if tick % self.shared.timing.outer_divisor == 0:
             q = self._map.joint_positions(state.position)
             torque = self._map.motor_torques(self._body.gravity_torque(q).tolist())
             self.carrying = [t / k for t, k in zip(torque, self.contract.torque_constant, strict=True)]
         self.commanded = list(self.carrying)
         self.commanded[0] += self._current if tick // CONFORMANCE_LIMITS.swing % 2 else -self._current
-        make = self.wanted or self.command
-        self._command.publish(make(stamp, self.commanded))
+        make, publisher = self.wanted or self.command, self.publisher(COMMAND)
+        publisher.publish(make(stamp, self.commanded))
         self.answered = stamp
         if self.after:
-            self._command.publish(self.after.pop(0)(stamp))
+            publisher.publish(self.after.pop(0)(stamp))
 
     def command(self, stamp: int, currents: list[float]) -> Any:
         """A proper command."""
@@ -130,9 +129,9 @@ class DriverBench(StackClient):
     def take_status(self, status: NodeStatus) -> None:
         """Keep a status of the driver, and follow its session."""
         if status.node == "driver":
+            before = self.status.session
             self.reported.append((time.monotonic(), status))
-            if status.session != self._session:
-                self._session = status.session
+            if status.session != before:
                 self.report()
 
     def report(self, fault: str = "", node: str = "velocity_loop", started_with: str = "") -> None:
@@ -143,10 +142,10 @@ class DriverBench(StackClient):
         started_with : digests of its shared parameters (`wam_description.agreement`).
         """
         facts = {DIGESTS: started_with} if started_with else {}
-        status = READY._replace(node=node, session=max(self._session, 0), fault=fault, facts=facts)
+        status = READY._replace(node=node, session=self.status.session, fault=fault, facts=facts)
         if fault:
             status = status._replace(level=Level.ERROR, message=fault)
-        self.publisher(STATUS).publish(diagnostic_status(status, self._arm.name))
+        self.publisher(STATUS).publish(diagnostic_status(status, self.shared.arm.name))
 
     def be_proper(self) -> None:
         """Answer again as a velocity loop that is right."""
@@ -255,11 +254,6 @@ class DriverBench(StackClient):
         """Currents by the effort of a state, A."""
         return [t / k for t, k in zip(state.value.effort, self.contract.torque_constant, strict=True)]
 
-    def is_zero(self, state: Arrived) -> bool:
-        """Whether no current flows, by the effort of a state."""
-        pairs = zip(self.flow(state), self.contract.peak, strict=True)
-        return all(abs(flow) <= self.tolerance(0.0, peak) for flow, peak in pairs)
-
     @staticmethod
     def tolerance(current: float, peak: float) -> float:
         """Largest difference of a current from the commanded one, A."""
@@ -267,7 +261,13 @@ class DriverBench(StackClient):
 
     def last_flow(self) -> int:
         """Stamp of the newest state with a current, ns, 0 where there is none."""
-        return max((state.stamp for state in self.states() if not self.is_zero(state)), default=0)
+        stamps = (
+            state.stamp
+            for state in self.states()
+            for flow, peak in zip(self.flow(state), self.contract.peak, strict=True)
+            if abs(flow) > self.tolerance(0.0, peak)
+        )
+        return max(stamps, default=0)
 
     def stops(self, after: int, limit: float) -> str:
         """What is wrong with how the current stops, counted from a stamp, ns, that was the last good one."""

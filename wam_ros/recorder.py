@@ -282,13 +282,9 @@ class Recorder:
         """Received and lost messages by topic and publisher."""
         return [count for channel in self._channels.values() for count in _counts(channel)]
 
-    def dropped(self) -> int:
-        """Messages lost on the way to the recorder."""
-        return sum(count.dropped for count in self.counts())
-
-    def lost_at_end(self) -> int:
-        """Messages that their nodes announced and that have not come, so far."""
-        return sum(count.lost_at_end for count in self.counts())
+    def total(self, name: str) -> int:
+        """A number of `Count` of all topics and publishers, so far."""
+        return sum(getattr(count, name) for count in self.counts())
 
     def finish(self, unfinished: Sequence[str] = ()) -> None:
         """Write counts and losses into the bag and close it; `failure` gives the reason if that was not possible.

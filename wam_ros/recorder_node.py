@@ -65,7 +65,7 @@ class RecorderNode(StackNode):
         """Record the messages that have arrived, write parameters and counts, close the bag."""
         self._drain()
         end = time.monotonic() + RECORDER_LIMITS.announced
-        while self.recorder.lost_at_end() and time.monotonic() < end:  # it may still be on the way
+        while self.recorder.total("lost_at_end") and time.monotonic() < end:  # it may still be on the way
             time.sleep(0.02)
             self._drain()
         self._close()
@@ -142,19 +142,15 @@ class RecorderNode(StackNode):
             else:
                 self.get_logger().error(failure, once=True)
                 self.health.publish(NodeStatus(Level.ERROR, failure))
-        if self.recorder.dropped():
+        if self.recorder.total("dropped"):
             self.get_logger().warning(
                 "the recorder is too slow and loses messages; it counts them when it ends", once=True
             )
 
     def _facts(self) -> dict[str, str]:
-        counts = self.recorder.counts()
-        return {
-            "bag": str(self.bag.path),
-            "received": str(sum(count.received for count in counts)),
-            "dropped": str(sum(count.dropped for count in counts)),
-            "lost_at_disk": str(self.recorder.lost_at_disk),
-        }
+        recorder = self.recorder
+        totals = {name: str(recorder.total(name)) for name in ("received", "dropped")}
+        return {"bag": str(self.bag.path), **totals, "lost_at_disk": str(recorder.lost_at_disk)}
 
     def _drain(self) -> None:
         """Record what has arrived, in the order in which it was sent: the time of a message may be that before it."""
@@ -192,7 +188,7 @@ class RecorderNode(StackNode):
         if self.recorder.failure:
             lost = f"{self.recorder.lost_at_disk} of the received messages are not in the bag"
             self.get_logger().error(f"{self.recorder.failure}; {lost}; received: {counts} on the way")
-        elif self.recorder.lost_at_end() or unfinished:
+        elif self.recorder.total("lost_at_end") or unfinished:
             self.get_logger().warning(f"{self.bag.path}: {counts}")
         else:
             self.get_logger().info(f"{self.bag.path}: {counts}")

@@ -481,7 +481,7 @@ def test_the_times_of_a_lockstep_recording_are_not_those_of_another_arm(tmp_path
     found.receive("/diagnostics", diagnostics("left: driver", 6_000_000), 0, 0, 1)
     found.receive("/diagnostics", diagnostics("right: gravity", 1_795_558_390_219_000_000), 0, 0, 30)
     found.receive("motor_states", bytes(serialize_message(state(7_000_000, 0.1))), 0, 0, 2)
-    assert found.dropped() == 0
+    assert found.total("dropped") == 0
     found.finish()
     times = sorted(message.log_time for message in recovered(next((tmp_path / "bag").glob("*.mcap"))))
     assert times[-1] == 7_000_000
@@ -607,9 +607,9 @@ def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_pa
         found.receive(name, data, 0, 0, number)
         if number in (6500, 7500):
             found.announce("driver", name, number - 3)
-    assert found.lost_at_end() == 0
+    assert found.total("lost_at_end") == 0
     found.announce("driver", name, 8010)
-    assert found.lost_at_end() == 11
+    assert found.total("lost_at_end") == 11
 
 
 @pytest.mark.parametrize(("change", "required"), [("deleted", True), ("moved", False)])
