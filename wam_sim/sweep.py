@@ -67,10 +67,10 @@ class SweepResult(NamedTuple):
     """
 
     failure: str
-    duration: float
-    force_rms: float
-    force_worst: float
-    force_peak: float
+    duration: float = 0.0
+    force_rms: float = math.nan
+    force_worst: float = math.nan
+    force_peak: float = math.nan
     unassessed: str = ""
     reported: str = ""
 
@@ -146,15 +146,14 @@ def points(
 
 def outcome(point: SweepPoint) -> SweepResult:
     """Play the scenario and measure; refused parameters are a failure of this run alone."""
-    nothing = math.nan
     try:
         run = Simulation(point.configuration, point.steps)
         require_playable("the scenario", point.steps, point.configuration)
         failure = run.play()
     except ParameterError as error:
-        return SweepResult(str(error), 0.0, nothing, nothing, nothing)
+        return SweepResult(str(error))
     except Exception as error:  # other runs go on
-        return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
+        return SweepResult(f"unexpected {raised(error)}")
     reactions, played = run.reactions, run.played
     others = [one for one in played if one.step.force == NO_FORCE]  # a force is measured, and named there if refused
     found = [failure, *unmet_in_words(reactions, others)]
