@@ -646,9 +646,9 @@ def test_a_table_holds_commands_and_one_of_several_joints_has_the_name_of_its_co
 ) -> None:
     time, q, _, effort = motion(100.0, 0.7, 0.5)
     table = {"time": time, "q[1]": 0.0 * q, "q[2]": q, "command.q[2]": 0.5 * np.sin(1.4 * math.pi * time)}
-    table["tau (2)"] = effort
+    table |= {"tau (2)": effort, "force": effort}
     found = analyse(table, lambda doing: None, topic_map([], joints, [], ["position=q[2]", "effort=tau (2)"], []))
     told = " ".join(sentence for section in found.sections for sentence in section.sentences)
     assert re.search(rf"{re.escape(name)} repeats at 0.7 Hz.*, as it was commanded", told)
     assert "Taken as commands: joints_command" in told
-    assert "Not used: q[1]; rename" in told
+    assert "Not used: q[1]; force; rename" in told

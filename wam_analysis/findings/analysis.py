@@ -1,5 +1,6 @@
 """The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -236,15 +237,19 @@ def _own_line(recording: AnalysedRecording) -> str:
 
 def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
     """The changes of live parameters while the arm ran; zero is in ns."""
-    newest, named = dict[str, Any](), list[str]()
+    newest, ends, named = dict[str, Any](), dict[str, int](), list[str]()
+    changes = list[tuple[str, Any, Any, int]]()
     for stamp, values in run.live_values(*run.parameters.nodes):
         for key, value in values.items():
             node, _, name = key.partition(":")
             before = newest.get(key, run.parameters.nodes.get(node, {}).get(name))
             if before not in (None, value):
-                text = f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s"
-                named.append(text + _lowered(run, node, name, stamp))
+                changes.append((key, before, value, stamp))
             newest[key] = value
+    for key, before, value, stamp in reversed(changes):
+        lowered = _lowered(run, key, stamp, ends.get(key, math.inf))
+        named.insert(0, f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s{lowered}")
+        ends[key] = stamp
     if named:
         more = f" and {len(named) - LAYOUT.changes} more" * (len(named) > LAYOUT.changes)
         yield (
@@ -253,12 +258,14 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
         )
 
 
-def _lowered(run: RecordedRun, node: str, name: str, since: int) -> str:
-    """To what the guard lowered a parameter that was set at a time, ns, '' where it did not."""
-    later = (
-        status.facts.get("lowered", "") for at, status in run.stamped_statuses() if at >= since and status.node == node
-    )
-    return next((f", lowered by the guard to {text}" for text in later if name in text), "")
+def _lowered(run: RecordedRun, key: str, begin: int, end: float) -> str:
+    """To what the guard lowered a parameter that had a value from one time to another, ns, '' where it did not."""
+    node, _, name = key.partition(":")
+    text = ""
+    for at, status in run.stamped_statuses():
+        if begin <= at < end and status.node == node:
+            text = status.facts.get("lowered", text)
+    return f", lowered by the guard to {text}" * (name in text)
 
 
 SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, force_section, contact_section)

@@ -26,7 +26,11 @@ NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was n
 COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
 UNUSED = "unused column"  # in place of the type of a topic
-RENAMED = "position.JOINT, velocity.JOINT or effort.JOINT; for a single joint, give --map position=COLUMN instead"
+RENAMED = (
+    "position.JOINT, velocity.JOINT, effort.JOINT, force.x to torque.z; for a single joint, give --map position=COLUMN "
+    "instead"
+)
+WRENCH = ("force", "torque")  # quantities along x, y and z
 
 
 def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
@@ -104,9 +108,10 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     series, given = _with_one_time(series, given)
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
+    found |= {quantity: [one for one in found[quantity] if one.name in tuple("xyz")] for quantity in WRENCH}
     every = [one for columns in found.values() for one in columns]
     used = {one.title for one in every} | {"index"}  # which a data frame has
-    for quantity in (*JOINT_FIELDS, "force", "torque"):
+    for quantity in (*JOINT_FIELDS, *WRENCH):
         if any(one.has_unit for one in found[quantity]):
             units[quantity] = found[quantity][0][:2]
     clock = next((one for one in found["stamp"] if not one.name), None)
@@ -161,7 +166,7 @@ def _topics(
         p, v, e = (stacked(q, joints) for q in JOINT_FIELDS)
         yield "joints", JointColumns(times, times, nothing, names, p, v, e)
     if parts["force"] or parts["torque"]:
-        yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz") for q in ("force", "torque")))
+        yield "wrench", WrenchColumns(times, times, nothing, *(stacked(q, "xyz") for q in WRENCH))
 
 
 def _require_one_run(path: Path, times: Times, series: Mapping[str, Any]) -> None:
