@@ -28,6 +28,7 @@ from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
+from wam_ros.local_bus import LocalBus
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
@@ -109,7 +110,7 @@ class RunningArm:
 
     def __init__(self, domain_id: int, folder: Path) -> None:
         self._domain_id, self._folder = domain_id, folder
-        self._composition: Any = None
+        self._composition: Composition | None = None
         self.fault = ""
         self._expected: set[str] = set()  # topics of which messages may be refused
 
@@ -157,11 +158,14 @@ class RunningArm:
         self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
         bus = self.context.bus if self._is_lockstep else None
         for topic, row in rows.items():
-            take, name = self._taking(topic), topic_name(self.node, row)
-            if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
-                bus.subscribe(self.node.resolve_topic_name(name), lambda message, take=take: take(message.data))
-            else:
-                self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
+            self._listen_to(row, self._taking(topic), bus)
+
+    def _listen_to(self, row: Topic, take: Callable[[bytes], None], bus: LocalBus | None) -> None:
+        name = topic_name(self.node, row)
+        if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(row.name)):
+            bus.subscribe(self.node.resolve_topic_name(name), lambda message: take(message.data))
+        else:
+            self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 
     def _taking(self, topic: str) -> Callable[[bytes], None]:
         kept = self._recorded.data[topic]
@@ -210,6 +214,7 @@ class RunningArm:
     def add(self, node: Any) -> Any:
         """Spin a plain rclpy node, too.  Make it with ``context=arm.context``; it ends with the test."""
         self._require_start()
+        assert self._composition is not None
         return self._composition.add(node)
 
     def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
@@ -385,6 +390,7 @@ class RunningArm:
             self.start(configuration=playing(steps, self._folder, **start))
         elif steps or start or "scenario" not in self.configuration.shared.nodes:
             raise ValueError("the arm has been started already; call play instead of start, with its arguments")
+        assert self._composition is not None
         failure = self._composition.play()
         self.close()
         if failure:

@@ -28,6 +28,7 @@ from wam_bag.bag import Bag, BagError, read
 from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
+from wam_description.signals import NodeStatus
 from wam_sim.recorded_run import RecordedRun
 
 Progress = Callable[[str], None]
@@ -237,34 +238,30 @@ def _own_line(recording: AnalysedRecording) -> str:
 
 def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
     """The changes of live parameters while the arm ran; zero is in ns."""
-    newest, ends, named = dict[str, Any](), dict[str, int](), list[str]()
-    changes = list[tuple[str, Any, Any, int]]()
+    newest, changes = dict[str, Any](), list[tuple[int, str, Any, Any]]()
     for stamp, values in run.live_values(*run.parameters.nodes):
         for key, value in values.items():
             node, _, name = key.partition(":")
             before = newest.get(key, run.parameters.nodes.get(node, {}).get(name))
             if before not in (None, value):
-                changes.append((key, before, value, stamp))
+                changes.append((stamp, key, before, value))
             newest[key] = value
-    for key, before, value, stamp in reversed(changes):
-        lowered = _lowered(run, key, stamp, ends.get(key, math.inf))
-        named.insert(0, f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s{lowered}")
-        ends[key] = stamp
-    if named:
-        more = f" and {len(named) - LAYOUT.changes} more" * (len(named) > LAYOUT.changes)
-        yield (
-            f"Changed while it ran: {', '.join(named[: LAYOUT.changes])}{more}. "
-            "Predictions are for the values at the start."
-        )
+    if not changes:
+        return
+    statuses, named = run.stamped_statuses(), list[str]()
+    for i, (stamp, key, before, value) in enumerate(changes[: LAYOUT.changes], 1):
+        end = next((later for later, other, *_ in changes[i:] if other == key), math.inf)
+        lowered = _lowered(statuses, key, stamp, end)
+        named.append(f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s{lowered}")
+    more = f" and {len(changes) - len(named)} more" * (len(changes) > len(named))
+    yield f"Changed while it ran: {', '.join(named)}{more}. Predictions are for the values at the start."
 
 
-def _lowered(run: RecordedRun, key: str, begin: int, end: float) -> str:
+def _lowered(statuses: Sequence[tuple[int, NodeStatus]], key: str, begin: int, end: float) -> str:
     """To what the guard lowered a parameter that had a value from one time to another, ns, '' where it did not."""
     node, _, name = key.partition(":")
-    text = ""
-    for at, status in run.stamped_statuses():
-        if begin <= at < end and status.node == node:
-            text = status.facts.get("lowered", text)
+    own = [status.facts for at, status in statuses if begin <= at < end and status.node == node]
+    text = next((facts["lowered"] for facts in reversed(own) if "lowered" in facts), "")
     return f", lowered by the guard to {text}" * (name in text)
 
 

@@ -157,11 +157,14 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
         nothing = np.full(len(clock), math.nan)
         numbers = {name: np.isfinite(np.column_stack([nothing, *v.values()])).any(axis=1) for name, v in parts.items()}
         masks = {mask.tobytes(): mask for mask in numbers.values()}.values()
+        senders = {  # of a joint: it sent all messages with it, or those in some of which alone it comes along
+            name: max((one for one in masks if one[known].all()), key=np.count_nonzero)
+            for name, known in numbers.items()
+            if name
+        }
         for frame, own, sent in _frames(columns, clock / 1e9, is_command):
             for name, values in parts.items():
-                known, of_sender = numbers[name], sent
-                if name:  # its sender has all messages with it, or those in some of which alone it comes along
-                    of_sender = sent & max((one for one in masks if one[known].all()), key=np.count_nonzero)
+                known, of_sender = numbers[name], sent & senders.get(name, True)
                 if (given.joints and name and name not in given.joints) or not np.any(of_sender & own):
                     continue
                 one = timed.get(of_sender.tobytes()) or _timed(clock, received, columns, of_sender)
