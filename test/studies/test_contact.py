@@ -182,7 +182,7 @@ def found(name: str, scores: list[ContactScore]) -> Interval:
 def test_rows_of_synthetic_contacts_are_those_that_went_in() -> None:
     scores = synthetic(error=0.025, latency=0.04, right=0.93)
     assert found("external torque in motion, rms, joint1", scores).value == pytest.approx(0.2)
-    assert found("false alarms in free motion with stops", scores)[::3] == (0.0, 200)
+    assert found("false alarms in free motion with pauses", scores)[::3] == (0.0, 200)
     assert found("5 N on the outer link detected within 60 ms", scores).value == 1.0
     assert found("5 N on the outer link detected within 30 ms", scores).value == 0.0
     assert found("position on the outer link at 5 N, median error", scores).value == pytest.approx(0.025)

@@ -186,7 +186,7 @@ def stated_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
             required, target = ((0.0, end) if math.isfinite(end) else ANY for end in ends)
             yield Row(f"external torque {when}, rms, {name}", found, "N m", 1.0, required, target)
     quiet = false_alarms(in_groups(scores, "free"))
-    yield Row("false alarms in free motion with stops", quiet, "", 1.0, NONE_AT_ALL, NONE_AT_ALL, EVALUATION.quiet)
+    yield Row("false alarms in free motion with pauses", quiet, "", 1.0, NONE_AT_ALL, NONE_AT_ALL, EVALUATION.quiet)
     links, outer = " or ".join(outer_covers(arm)).replace("_", " "), on_outer_link(scores, arm)
     yield from position_rows(links, outer, STATED)
     small = [one for one in outer if one.position_sd < EVALUATION.small_sd]
