@@ -19,7 +19,7 @@ from wam_description.number_text import apart, brief, digits_apart
 from wam_sim.reactions import OUTCOMES, STEADY, unmet
 
 HOW = (
-    "In brackets: the worst value of all steps. The error of a force includes its ripple. "
+    "In brackets: the worst value. The error of a force includes its ripple. "
     f"Contacts shorter than {TOUCH.bounce / 1e9:g} s do not count."
 )
 
@@ -182,8 +182,10 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     wrong = dict.fromkeys(one.link for one in lasting if one.right < TOUCH.lasting)
     shown = f"another link than {', '.join(wrong)}"
     answer = _answer("correct link", [1.0 - one.right for one in lasting], 1.0 - TOUCH.lasting, shown)
-    least = f"{100.0 * min((one.right for one in lasting), default=0.0):.3g} %, required: {100.0 * TOUCH.lasting:g} %"
-    return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
+    if answer.result is not VerdictResult.YES:
+        return answer
+    least = 100.0 * min(one.right for one in lasting)
+    return answer._replace(worst=f"{least:.3g} % of contact time, required: {100.0 * TOUCH.lasting:g} %")
 
 
 def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
