@@ -128,7 +128,7 @@ class Folding:
     damping: float = parameter("damping", "N s/m", high=1e6)
     friction: float = parameter("friction coefficient", high=10.0)
     clearance: float = parameter(
-        "length of the outer tube, from the joint, that never makes contact, because the tubes overlap near the joint",
+        "length of the outer tube, from the joint, that never makes contact",
         "m",
         high=10.0,
     )

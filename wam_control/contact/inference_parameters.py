@@ -9,9 +9,7 @@ from wam_description.parameters import parameter
 class InferenceParameters:
     """Prior probabilities of a contact, before it is detected."""
 
-    weights: tuple[float, ...] = parameter(
-        "relative frequency of contacts on each cover; the outer one moves through more space", low=1e-3, high=1e3
-    )
+    weights: tuple[float, ...] = parameter("relative frequency of contacts on each cover", low=1e-3, high=1e3)
     force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
         "sd of the distance between the line of the force and the axis of the tube, as a fraction of the tube's radius",

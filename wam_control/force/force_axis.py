@@ -49,21 +49,21 @@ class SensingParameters:
         "sd of the tangential force on the link, as a fraction of the commanded force", high=2.0, live=True
     )
     zero_limit: float = parameter(
-        "largest external torque of a joint that the loop takes as zero when a force begins at rest without a "
-        "detected contact; 0: no torque",
+        "when a force begins at rest without a detected contact, the loop subtracts the external joint torques, if "
+        "all of them are below this; 0: it subtracts none",
         "N m",
         high=1e3,
         live=True,
     )
     least_apparent_mass: float = parameter(
-        "smallest apparent mass of the arm that the weights of the joint torques may give a measured force; 0: no "
-        "bound. Without a bound, the largest stable gain and the error of oblique forces are smaller",
+        "the loop weights the joint torques such that the measured force has at least this apparent mass; a larger "
+        "one permits a larger gain, but increases the error of oblique forces; 0: no bound",
         "kg",
         high=100.0,
         live=True,
     )
     apparent_mass_limit: float = parameter(
-        "apparent mass above which the motion along a direction is slower; 0: no limit",
+        "if the apparent mass along a force is larger, the arm moves along it more slowly, by their ratio; 0: no limit",
         "kg",
         high=1e6,
         live=True,

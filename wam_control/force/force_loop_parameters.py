@@ -166,7 +166,7 @@ class ForceLoopParameters:
     )
     contact_source: str = parameter(
         "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
-        "enough. If a force command in a cover's frame has a torque, this gives the position in both cases",
+        "enough. If a force command in a cover's frame has a torque, this torque gives the position in both cases",
         choices=("estimated", "pinned"),
         live=True,
     )

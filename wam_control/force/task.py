@@ -298,7 +298,7 @@ class TaskParameters:
         "least damping of an impedance of a joint", "N m s/rad", low=1e-3, high=1e6, live=True
     )
     largest_rate: float = parameter(
-        "largest stiffness of an impedance per damping, and velocity per error of a commanded position",
+        "largest ratio of stiffness to damping of an impedance; also velocity per error of a commanded position",
         "1/s",
         high=100.0,
         live=True,

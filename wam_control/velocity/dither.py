@@ -23,7 +23,7 @@ class DitherParameters:
     """Size and shape of the dither; its period is `timing.dither_cycle`."""
 
     level: float = parameter(
-        "torque amplitude of the dither, divided by the static friction of motor and joints at the motor; 0: off",
+        "torque amplitude of the dither, divided by the motor torque that overcomes static friction; 0: off",
         high=3.0,
         live=True,
     )
