@@ -95,7 +95,7 @@ def holding(runs: Runs) -> Result:
         near("true force across the tube", 15.0, squeeze, "N", "commanded", BOUNDS.force),
         near("weight carried by friction", weight, carried, "N", "m g", 0.02),
         noted("of it by the link", lift, "N"),
-        noted("friction that is needed", weight / capacity, "of what 15 N give"),
+        noted("friction that is needed", weight / capacity, "of the largest at 15 N"),
         noted("shelf lowered by", np.ptp(objects["shelf"].position[:, 2]), "m"),
         below("force of the shelf, after", np.abs(shelf.other_force).max(), "N", 1e-6),
         below("the tube sinks", np.ptp(start.position[:, 2]), "m", 2 * BOUNDS.still, "friction holds"),

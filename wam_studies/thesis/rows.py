@@ -97,8 +97,8 @@ def cells(row: Comparison) -> tuple[str, ...]:
     """The texts of a row, in the order of `HEAD`."""
     return (
         row.quantity,
-        _value(row.predicted),
-        _value(row.measured),
+        value_text(row.predicted),
+        value_text(row.measured),
         row.unit,
         _deviation(row, row.deviation, "+"),
         _deviation(row, row.bound, ""),
@@ -114,7 +114,7 @@ def plain(rows: Iterable[Comparison]) -> str:
 
 def markdown(rows: Iterable[Comparison]) -> str:
     """The rows that have a prediction as a table of Markdown."""
-    return table.markdown(PAGE_HEAD, [_page_cells(row) for row in rows if _value(row.predicted) != NOTHING])
+    return table.markdown(PAGE_HEAD, [_page_cells(row) for row in rows if value_text(row.predicted) != NOTHING])
 
 
 def _page_cells(row: Comparison) -> tuple[str, ...]:
@@ -132,7 +132,8 @@ def summary(rows: Sequence[Comparison]) -> tuple[str, ...]:
     return verdict, *_page_cells(max(claimed, key=lambda row: row.nearness))
 
 
-def _value(value: float | str) -> str:
+def value_text(value: float | str) -> str:
+    """A cell of a table."""
     return value if isinstance(value, str) else NOTHING if math.isnan(value) else f"{value:.4g}"
 
 

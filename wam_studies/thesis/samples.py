@@ -19,6 +19,7 @@ from wam_studies.thesis.cutting import cut
 from wam_studies.thesis.definition import Experiment
 from wam_studies.thesis.evaluation import evaluate_sample
 from wam_studies.thesis.recording import recording
+from wam_studies.thesis.rows import value_text
 
 FOLDER: Final = "sample"
 INDEX: Final = "index.yaml"
@@ -168,7 +169,7 @@ def table(entries: list[Entry]) -> str:
         link, command = f"[{entry.name}]({FOLDER}/{entry.name})", f"`{entry.command}`"
         samples.append((link, entry.shows, part, str(entry.messages), size, command, f"`{digest[:16]}…`"))
         for row in entry.rows:
-            values = (v if isinstance(v, str) else f"{v:.4g}" for v in (row["predicted"], row["measured"]))
+            values = map(value_text, (row["predicted"], row["measured"]))
             same = "the same" if row["is_whole"] else "differs"
             quantities.append((entry.name, row["quantity"], *values, row["unit"], same))
     total = sum(entry.size for entry in entries)
