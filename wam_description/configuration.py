@@ -123,13 +123,12 @@ class Configuration(NamedTuple):
     def _meant(self, key: str) -> str:
         """Parameters that `key` may mean: of this name in another section, or the one that is most like it."""
         keys = {
-            name if section == SHARED else f"{section.rpartition('/')[2]}:{name}"
+            name if section == SHARED else f"{section.rpartition('/')[2]}:{name}": name
             for section, names in self.sections.items()
             for name in names
         }
-        parameter, of_node = key.rpartition(":")[2], key.replace(".", ":", 1)
-        found = sorted(one for one in keys if one.rpartition(":")[2] == parameter or one == of_node)
-        found = found or difflib.get_close_matches(key, keys, n=1)
+        alike = difflib.get_close_matches(key.rpartition(":")[2], keys.values(), n=1)
+        found = sorted(one for one, name in keys.items() if name in alike or one == key.replace(".", ":", 1))
         # a parameter of all nodes is none of this one, so that its name alone would be what was given
         return " or ".join(f"'{one}'" + f" of section '{SHARED}'" * (":" in key and ":" not in one) for one in found)
 
@@ -381,8 +380,8 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
         raise ParameterError(f"{path} has the key '{near[0]}'; did you mean '{BASE}'?")
     if not isinstance(tree, dict) or (whole and SHARED not in tree):
         raise ParameterError(
-            f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top, or '{BASE}: wam' if "
-            "it only changes another configuration"
+            f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top level, or "
+            f"'{BASE}: wam' if it only changes another configuration"
         )
     if whole and list(tree)[-1] != SHARED:
         raise ParameterError(

@@ -86,8 +86,7 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
     "wrist": "motor 7 has {detail} poles; allowed: 6, those of a wrist; this driver does not know the transmission "
     "ratios of a gimbal",
     "counts": "motor controller {node} has {detail} counts per turn; allowed: 4096 or 40960",
-    "gain": "motor controller {node} has {detail} counts per N m, far from the maker's value; correct its property "
-    "IPNM",
+    "gain": "motor controller {node} has {detail}; correct its property IPNM",
     "limit": "the largest torque (property MT) of motor controller {node} is {detail}; it must be above 0",
     "index": "motor controller {node} would take the torque of another motor: its index or group is {detail}",
     "not_zeroed": "motor controller {node} did not accept the position of the home pose: it reports {detail} counts",
@@ -107,7 +106,7 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
 SENTENCES: Final = {  # by cause
     # the arm holds
     "error": UNCERTAIN + HELPED,
-    "moved_fast": "for now: when the command came, the arm moved faster than {speed:g} rad/s, so the load on it is not "
+    "moved_fast": "when the command came, the arm moved faster than {speed:g} rad/s, so the load on it is not yet "
     "known; the arm holds its position, and presses once it is at rest",
     "task": "{reason}; the arm holds its position",
     "other_link": "{touched} is touched, but the force is commanded on {cover}; command it on {touched}, or free the "

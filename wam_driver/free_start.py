@@ -40,6 +40,6 @@ def require_free_start(model: Any, data: Any, arm: Arm, world: World) -> None:
     if depths:
         found = " and ".join(inside.format(f"{1e3 * depth:.3g}") for inside, depth in depths.items())
         raise ParameterError(
-            f"at power-up {found}; allowed: up to {1e3 * PLANT.deepest:g} mm, or {PLANT.hardest:g} N by its stiffness; "
-            "move it away from the arm (world), or start the arm in another pose (arm.joints.start)"
+            f"at power-up {found}; allowed: up to {1e3 * PLANT.deepest:g} mm, or a contact force of {PLANT.hardest:g} N"
+            "; move it away from the arm (world), or start the arm in another pose (arm.joints.start)"
         )

@@ -21,7 +21,7 @@ from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import Interface, declared, is_packaged, require_parameters
-from wam_description.parameters import ParameterError, dotted, meant
+from wam_description.parameters import ParameterError, dotted, meant, require
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Call
@@ -328,7 +328,7 @@ class RunningArm:
         Raises
         ------
         ValueError
-            where there is no such topic, or no node takes it that would refuse a value of a wrong shape.
+            where there is no such topic, or the value has a wrong shape and no node takes the topic.
         """
         self.publisher(topic)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
@@ -428,7 +428,7 @@ def configured(
     replaced = {name: _entry(value) for name, value in values.items() if _is_node(value)}
     every = [*(nodes or base.shared.nodes), *map(_entry, own)]
     entries = [replaced.pop(declared(entry).name, entry) for entry in every]
-    assert not replaced, f"{', '.join(replaced)} is no node of this stack; it has {', '.join(every)}"
+    require(not replaced, f"{', '.join(replaced)} is no node of this stack; it has {', '.join(every)}")
     groups = {name.partition(".")[0] for name in base.sections[SHARED]}
     changed: dict[str, dict[str, Any]] = {
         SHARED: {

@@ -122,7 +122,7 @@ class TolerantNode(LeavingNode):
 
     def _refusal(self, name: str, reason: str) -> SetParametersResult:
         live = [one for one in sorted(self.list_parameters([], 0).names) if not self.describe_parameter(one).read_only]
-        allowed = f"allowed, as they can change while node {self.get_name()} runs: {', '.join(live) or 'none'}"
+        allowed = f"while node {self.get_name()} runs, these may change: {', '.join(live) or 'none'}"
         return SetParametersResult(successful=False, reason=f"{reason}; {meant(name, live)}{allowed}")
 
     def _take_exception(self, what: str, error: Exception) -> None:

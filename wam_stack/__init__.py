@@ -6,7 +6,7 @@ simulate  play a scenario on the simulated arm, without ROS
 read      the numbers in a bag
 analyse   what a recording shows, and what is wrong with it
 guard     how stable the force loop of a configuration is
-identify  the model of the controllers, from a recording
+identify  the arm as the controllers know it, from a recording
 arm       kinematics, Jacobians and gravity torques
 ========  ===================================================
 """
@@ -112,7 +112,7 @@ def analyse(recording: str | Path | Bag | Mapping[str, Any] | np.ndarray | Simul
             motors = read(path, ["motor_states"]).series("motor_states")
             before = [row.values for row in recording.rows["motor_states"]]
             if not np.array_equal(np.transpose(before), [values for name, values in motors.items() if name != "time"]):
-                raise ValueError("the simulation differs when it is played again: play it to its end, by itself")
+                raise ValueError("the simulation differs when it is played again; give one as `simulate` returns it")
             return analyse(path)
     return _analyse(recording.path if isinstance(recording, Bag) else recording, lambda doing: None)
 
@@ -137,7 +137,7 @@ def guard(configuration: Named = "wam") -> Report:
 
 
 class IdentifiedModel(NamedTuple):
-    """The model of the controllers as a recording shows it.
+    """The arm as the controllers know it, from a recording.
 
     Attributes
     ----------

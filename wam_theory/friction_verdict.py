@@ -21,7 +21,7 @@ class Domain(StrEnum):
     I = "I"  # noqa: E741 - the thesis's name
     II = "II"
     III = "III"
-    BEYOND = "beyond I"  # II or III: whether friction stabilises it has not been examined
+    BEYOND = "II or III"  # whether friction stabilises it has not been examined
 
 
 class PredictedCycle(NamedTuple):
@@ -105,7 +105,7 @@ def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
 
 
 class StableErrors(NamedTuple):
-    """Largest saturations of F_error, 0 for none: with which all responses rest, and with which that is not refuted."""
+    """Largest saturations of F_error, 0 for none: all responses come to rest, or none was found that does not."""
 
     stable: float
     undecided: float

@@ -76,7 +76,7 @@ class LoopDesign(NamedTuple):
 MEANING = {
     Domain.I: "stable for every error",
     Domain.II: "friction stabilises it for small errors",
-    Domain.BEYOND: "II or III, undecided: no error was shown to be safe, and not all were shown to be unsafe",
+    Domain.BEYOND: "undecided: no error was shown to be safe, and not all were shown to be unsafe",
     Domain.III: "unstable: at every error that was tried, some response does not come to rest",
 }
 
@@ -95,7 +95,7 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
     ------
     ValueError
         where the damping is 0, a rate or delay is below 0, the delay has no rate or more than `longest_delay` periods,
-        or a number is `absurd`.
+        or a number is beyond `DESIGN.absurd`.
     """
     if not node.damping > 0.0:
         raise ValueError(f"damping is {node.damping:g}; without damping no gain is stable, give one above 0")

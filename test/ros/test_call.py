@@ -79,7 +79,7 @@ def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
     assert "'posture_gain=2' has no node" in called("set", "posture_gain=2")[2]
     code, out, err = called("set", "driver:watchdog=5.0")
     assert (code, out) == (1, "")
-    assert "parameter 'watchdog' is chosen at the start; allowed, as they can change while node driver runs: " in err
+    assert "parameter 'watchdog' is chosen at the start; while node driver runs, these may change: " in err
     code, out, err = called("get", "force_loop:posture_gian")
     assert (code, out) == (1, "")
     assert "did you mean 'posture_gain'?" in err

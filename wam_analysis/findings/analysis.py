@@ -120,7 +120,7 @@ def analyse(
             f"--namespace chooses an arm of this stack, but {path} is a recording of another robot; leave it out"
         )
     if found is not None:
-        progress("it is a recording of another robot")
+        progress("as a recording of another robot")
         return analyse_bag(foreign_bag(found, given), progress, given=given)
     bag, given = table_bag(path, series_of_csv(path), given)
     return analyse_bag(bag, progress, given=given)

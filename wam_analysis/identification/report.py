@@ -50,7 +50,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
         numbers = [f"{offset[i]:.4g}", f"{offset_sd[i]:.4g}", "0"]
         rows.append([f"motors.torque_offset.{name}", *numbers, "N m", "not from this recording"])
     head = [["parameter", "value", "standard error", "present value", "unit", "identifiable"]]
-    lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
+    lines = [f"{label}: model of the arm from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
     parts = (found.before, found.residual, found.held_out)
     lines += plain(
         [

@@ -24,7 +24,7 @@ OF_RECORDER = (
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `wam bag` to its parser."""
     requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
-    for name, text in (("info", "print what is in a bag"), ("repair", "repair a broken bag")):
+    for name, text in (("info", "print what is in a bag"), ("repair", "repair a broken bag in its place")):
         requests.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.").add_argument(
             "bag", help="directory of the bag, or an .mcap file", type=Path
         )

@@ -83,6 +83,8 @@ def _assess(given: argparse.Namespace) -> int:
         )
     *plant, gain = (getattr(given, name) for name in PLANT)
     stiction = given.friction if given.stiction is None else given.stiction
+    if stiction < given.friction:
+        raise ValueError(f"--stiction is {stiction:g}; give {given.friction:g}, the --friction, or more")
     loop = IntegralLoop(gain, error_limit=given.limit)
     design = loop_design(FrictionNode(*(*plant, stiction)), loop, given.rate, given.delay)
     print(design.text())

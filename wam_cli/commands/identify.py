@@ -69,7 +69,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Identify the model of the controllers from a bag."""
+    """Identify the model from a bag."""
     if (given.bag is None) == (given.excite is None):
         raise ValueError("give a bag, or --excite SCENARIO to make one")
     require_option(given, "--excite", "--seconds", "--seed", "--only-write")

@@ -29,7 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Print the model or the table."""
     if given.ros2_control and given.format != "urdf":
-        raise ValueError("--ros2-control adds a tag to the URDF; call: wam model urdf --ros2-control")
+        raise ValueError("--ros2-control adds a tag to the URDF; call: wam model urdf --ros2-control NAMESPACE")
     configuration = configuration_of(given)
     shared = configuration.shared
     if given.format == "scorecard":

@@ -66,7 +66,7 @@ def run(given: argparse.Namespace) -> int:
     processes = processes_of(configuration, given)
     killed: list[str] = []
     with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
-        started = f"{len(configuration.shared.nodes)} nodes started in"
+        started = f"{len(configuration.shared.nodes)} nodes in"
         if processes == ONE:
             print(f"{started} this process; Ctrl-C stops them", flush=True)
             failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)

@@ -176,8 +176,8 @@ class ContactEstimator:
 
         Parameters
         ----------
-        is_pressing : whether a force is commanded.  What it has touched lasts until the arm leaves, though it may be
-            too small to be detected: taken for an error of the model, it would be held ever larger.
+        is_pressing : whether a force is commanded.  A contact then lasts until the arm leaves it, also one that is too
+            small to be detected: learned as an error of the model, it would be pressed ever harder.
         """
         observer, parameters = self._observer, self._parameters
         torques, covariance = observer.torques()

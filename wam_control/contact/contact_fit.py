@@ -40,8 +40,8 @@ class Fit(NamedTuple):
     Attributes
     ----------
     probability : of this link among all hypotheses.
-    position : m, mean contact position, of the likelier ones of forces from the side and along the tube: a mean of both
-        would be where neither is.
+    position : m, mean contact position, by a force from the side or along the tube, whichever is likelier: a mean of
+        both would be where neither is.
     position_sd : m, root mean square distance of the contact from there, by both.
     low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
     along : probability that the force is along the tube, of a contact on this link.

@@ -10,8 +10,8 @@ H the effects of the model's errors and P their covariance, which are the same i
 rest or just reversed.  These may stay or change: they count as both, in L and in R.  One contact position explains all
 moments, by a force that grows and shrinks with the torques; how else it may change is in the covariance, too, by the
 links' probabilities: its direction by a fraction of its size, its position by the way that the arm has moved since,
-and by the speed of a contact that slides along its link.  Few do: how probable that is follows from the same moments,
-by how much better a speed explains them, whatever the force and the position.
+and by the speed of a contact that slides along its link.  Few slide: how probable that is follows from the same
+moments, by how much better a speed explains them, whatever the force and the position.
 How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
 `freedom` degrees of freedom of the statement itself.
 

@@ -3,8 +3,8 @@
 The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.  In one pose e stays as it
-is, with a dither, too, however many samples there are: they show more and more of that pose, which x and P then take
-in, but of others no more than one sample of R. The rest is forgotten where the arm is away from there without contact.
+is, also with a dither.  So many samples there show x and P more of that pose, but of other poses no more than one
+sample of R.  What holds in that pose alone is forgotten where the arm is away from there without contact.
 
 How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, S is so much
 larger.  Never smaller: on a better arm, links that are wrong by friction of the contact would seem certain.

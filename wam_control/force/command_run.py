@@ -191,7 +191,7 @@ class CommandRun:
         self.ways: Ways = {}
 
     def go_on(self, before: "CommandRun") -> None:
-        """Keep where the axes touch and hold, and what they press with, that were commanded before, too."""
+        """Of axes that were commanded before, keep where they touch and hold, and with what they press."""
         for one in self.axes:
             for other in before.axes:
                 if (before.frame, other.of) == (self.frame, one.of):
@@ -207,7 +207,7 @@ class CommandRun:
     def judge(self, q: Angles, measurement: ForceMeasurement, forces: ForceAxes, limit: float) -> None:
         """Decide once, for the first axis, whether the torques at rest are those of a touched surface.
 
-        What a payload explains may always be one.  Else those above a limit, N m, are no error of the model.
+        Torques that a payload explains are not.  Of others, those above a limit, N m, are.
         """
         axis = self.axes[0].now if self.axes else None
         if self._is_decided or axis is None or (axis.sensed is not None and axis.sensed.force_sd == math.inf):

@@ -16,7 +16,7 @@ from wam_description.transmission_map import TransmissionMap
 def force_torque(run: CommandRun, holds: bool, own: ForceLoopParameters) -> Array:
     """Torque of the forces (n,), N m: after the touch, where the place is known.
 
-    The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
+    The velocity loops need not wind up to it; what they have wound up to before is left out.
 
     Parameters
     ----------

@@ -152,7 +152,7 @@ class Watch:
     ----------
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
-    needed : factor that is demanded, and tried at most, so that a `scale` of this size is a least one.
+    needed : factor that is demanded; no larger one is tried, so that a `scale` of this size may be larger.
     assessed : contacts of the last assessment, none before the first; another list after each.
     """
 
@@ -266,5 +266,5 @@ def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:
 
 
 def margin_text(scale: float, largest: float = GUARD.largest_scale, digits: int = 4) -> str:
-    """Factor by which the gains may be larger, of which no more than `largest` was tried."""
+    """Factor by which the gains may be larger; none above `largest` was tried."""
     return f"{min(scale, largest):.{digits}g}{' or more' * (scale >= largest)}"

@@ -35,7 +35,7 @@ class Knowledge(NamedTuple):
     def among(self, q: Angles, axes: Sequence[CommandedAxis], contact: Contact) -> Links:
         """The same axis on each link that may be touched, with the probability of that, the largest first.
 
-        It is that of any contact there, less where no force that presses as commanded explains the torques.
+        The probability is that of any contact there; less where no force that presses as commanded explains torques.
         """
         able = [axis for axis in axes if axis.sensed and axis.sensed.force_sd < math.inf]
         if len(able) < 2:

@@ -49,9 +49,9 @@ def approach_speed(
     """Largest speed along a force, m/s.
 
     Until something is touched, the impact (3.1), v sqrt(m k), stays below `limits.impact` of the force.  At a place
-    that is not known the arm is slower, since the touch is detected late; after the touch, since the measured force is
-    late: it rises in no less than some latencies of it on the stiffest surface.  The velocity loops that wind up to
-    it yield as the surface does.
+    that is not known the arm is slower, since the touch is detected late; after the touch, too, since the measured
+    force is late: it rises in no less than some latencies of it on the stiffest surface.  The velocity loops that wind
+    up to it yield as the surface does.
 
     Parameters
     ----------

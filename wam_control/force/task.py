@@ -73,7 +73,7 @@ class TaskAxis(NamedTuple):
 
 
 class TaskCommand(NamedTuple):
-    """Axes that count alike; their directions are in `frame`, 'base' or a cover."""
+    """Axes of equal weight; their directions are in `frame`, 'base' or a cover."""
 
     frame: str
     axes: tuple[TaskAxis, ...]

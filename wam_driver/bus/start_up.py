@@ -124,7 +124,8 @@ class StartUp(Host):
             demand(node, name, [maker[name]], BusFault.INDEX)
         turn = demand(node, "CTS", BUS.encoders, BusFault.COUNTS)
         usual = range(int(maker["IPNM"] / BUS.gain_ratio), int(maker["IPNM"] * BUS.gain_ratio))
-        gain = demand(node, "IPNM", usual, BusFault.GAIN)
+        if (gain := demand(node, "IPNM")) not in usual:
+            raise Trouble(BusFault.GAIN, node, f"{gain} counts per N m; allowed: {usual[0]} to {usual[-1]}")
         most = demand(node, "MT", range(1, 1 << 31), BusFault.LIMIT)
         return Motor(node, turn, gain * self._constant[node - 1], min(most, limit))
 

@@ -56,7 +56,7 @@ def play_case(case: ContactCase) -> ContactScore:
 class ContactStudy(Study[ContactCase, ContactScore]):
     """Scenarios of an arm as stated; and drives of arms and signals with degradations, one at a time and mixed."""
 
-    title = "contact estimation on an arm like its model, or with degradations"
+    title = "contact estimation on an arm as modelled, or with degradations"
     page = "docs/contact.md"
 
     contacts: int = parameter("contacts in motion per seed", low=1, default=200)
