@@ -32,7 +32,7 @@ def stack(domain_of_module: int) -> Iterator[None]:
     """A stack in lockstep."""
     up = subprocess.Popen([*WAM, "up"], stdout=subprocess.PIPE, text=True, env=os.environ)
     assert up.stdout is not None
-    assert "nodes started" in up.stdout.readline()
+    assert "nodes in" in up.stdout.readline()
     yield
     up.send_signal(signal.SIGINT)
     up.wait(LONG)

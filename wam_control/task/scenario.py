@@ -452,7 +452,7 @@ def _read(path: str | Path, shared: Shared) -> list[ScenarioStep]:
     if isinstance(tree, dict):
         known(f"scenario {path}", tree, ("steps",), ("steps",))
     if not isinstance(tree, dict) or not isinstance(tree["steps"], list):
-        raise ParameterError(f"scenario {path} has no list 'steps'")
+        raise ParameterError(f"scenario {path} has no list 'steps'; write the steps below 'steps:'")
     require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
     return [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
 
