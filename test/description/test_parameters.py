@@ -211,7 +211,7 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
         ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
         (
             {"force_gain": [0.02], "force_gian": 0.02},
-            "unknown parameter 'force_gian'; did you mean 'force_gain'? while node",
+            "unknown parameter 'force_gian'; did you mean 'force_gain'? while node force_loop runs, these may",
         ),
         ({"force_gain": [0.5], "guard.mode": "refuse"}, "times the largest linearly stable one"),
         ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),

@@ -135,7 +135,7 @@ steps:
     assert lowered.startswith("the guard lowered it; used: force_gain [0.")
     assert why == "refused"
     assert float(row["force_worst"]) > 1.0
-    assert "1 set, 0 failed, 1 with a remark (column reported)" in capsys.readouterr().out
+    assert "1 set, 0 failed, 1 with a remark (column 'reported')" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -97,8 +97,8 @@ def run(given: argparse.Namespace) -> int:
     sets = drawn(axes, given.random, seed) if given.random else listed(axes) if given.list else grid(axes)
     failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
     failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
-    doubts = f", {doubted} with a remark (column reported)" if doubted else ""
-    count, why = f"{len(sets)} set{'s' * (len(sets) != 1)}", " (column failure)" * bool(failed)
+    doubts = f", {doubted} with a remark (column 'reported')" if doubted else ""
+    count, why = f"{len(sets)} set{'s' * (len(sets) != 1)}", " (column 'failure')" * bool(failed)
     print(f"{count}, {failed} failed{why}{doubts}, in {given.file}")
     if failed == len(sets):
         print(f"every set failed; the first: {failures[0]}", file=sys.stderr)
