@@ -15,11 +15,11 @@ class ShaftThresholds:
     window: float = 0.03  # s over which friction is averaged
     noisy: float = 6.0  # standard deviations of the noise of a velocity: a joint that is slower is at rest
     far: float = 20.0  # resolutions of a position: who moves so far has moved
-    brief: float = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
-    turns: float = 0.8  # of the rests of such a joint have motion to the other side behind them
+    rest_samples: int = 3  # of a rest between motions: fewer may be a turn
+    turn: float = 10.0  # times the way within a turn: in as much time after it, a parabola leads 8 times as far
     window_samples: int = 6  # in that window
     disobeyed: float = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
-    turning: float = 5.0  # % of the time at rest that a motion back and forth has where it turns
+    turning: float = 5.0  # % of the time at rest; a joint with less does not stick
     passing: float = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
     still: float = 0.01  # of the speed of rest: below it the shaft has not begun to move
     # friction
@@ -106,6 +106,7 @@ class CycleThresholds:
     neighbours: tuple[int, ...] = (8, 24)
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
     sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
+    apart: int = 4  # times higher or lower frequencies, between which a line is reported if it is the strongest
     clear_line: float = 0.05  # of the largest line: smaller ones are not reported
     # steps
     # part of the settling band that noise may fill after smoothing, four standard deviations of it

@@ -487,8 +487,7 @@ NOT_COMPARED = "/ft/wrench (tool), in the frame tool, is not compared with the c
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("frame_at", "measured_at", "doubt"),
-    [(12.0, 99.0, GOES_OVER), (99.0, 9.0, NOT_COMPARED), (12.0, 12.0, GOES_OVER)],
+    ("frame_at", "measured_at", "doubt"), [(12.0, 99.0, GOES_OVER), (99.0, 9.0, NOT_COMPARED), (12.0, 12.0, GOES_OVER)]
 )
 def test_a_step_ends_where_command_or_force_goes_over_to_another_frame(
     frame_at: float, measured_at: float, doubt: str, tmp_path: Path
@@ -631,8 +630,7 @@ def recorded_late(effort: Any, how: float | str) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("how", "drag", "said"),
-    [*((how, 0.0, "behind the motion") for how in (20.0, 10.0, "late")), ("", 0.4, "")],
+    ("how", "drag", "said"), [*((how, 0.0, "behind the motion") for how in (20.0, 10.0, "late")), ("", 0.4, "")]
 )
 def test_an_effort_that_lags_or_holds_a_drag_gives_the_friction_all_the_same(
     how: float | str, drag: float, said: str, tmp_path: Path

@@ -319,8 +319,7 @@ def test_late_messages_are_not_counted_as_missing(jitter, lost):
 
 
 @pytest.mark.parametrize(
-    ("factor", "verdict"),
-    [(1.0, Verdict.LIMIT_CYCLE), (1.08, Verdict.DIVERGED), (0.92, Verdict.SETTLED)],
+    ("factor", "verdict"), [(1.0, Verdict.LIMIT_CYCLE), (1.08, Verdict.DIVERGED), (0.92, Verdict.SETTLED)]
 )
 def test_four_swings_tell_whether_a_motion_cycles(factor, verdict):
     time = np.arange(0.0, 5.6, 0.001)

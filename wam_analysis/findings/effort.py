@@ -10,7 +10,7 @@ from wam_analysis.findings.stick_slip import rest_speed
 from wam_analysis.foreign.sources import Piece, Source, pieces, rests, ways
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import SHAFT
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.columns import JOINT_FIELDS
 
@@ -93,7 +93,7 @@ def _limited(source: Source) -> str:
     """That an effort stays at its bounds for long, which no friction with its noise does; '' where it does not."""
     effort = source.only("effort").values.get("effort", np.zeros(0))
     bounds = (float(np.min(effort, initial=math.inf)), float(np.max(effort, initial=-math.inf)))
-    share = float(np.mean(np.isin(effort, bounds))) if bounds[0] < bounds[1] else 0.0
+    share = float(np.mean(np.isin(effort, bounds) & (effort != 0.0))) if bounds[0] < bounds[1] else 0.0  # 0 is off
     if share < SHAFT.limited:
         return ""
     low, high = (shown(bound, source.units["effort"]) for bound in bounds)
@@ -122,15 +122,14 @@ def _lost_way(piece: Piece, unit: str) -> str:
 
     A velocity that is late differs only as far as it changes meanwhile.
     """
-    time, velocity = piece.time, piece.values["velocity"]
-    period = float(time[1] - time[0])
+    time, velocity, period = piece.time, piece.values["velocity"], piece.period
     width = max(1, round(SHAFT.way / period))
     if len(time) <= width:
         return ""
     moved, by = ways(piece, width)
     path = np.concatenate(([0.0], np.cumsum(np.abs(0.5 * period * (velocity[1:] + velocity[:-1])))))
     far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
-    allowed = SHAFT.agree * far + SHAFT.longest_effort_lag * np.abs(change) + SHAFT.joint_rest * SHAFT.way
+    allowed = SHAFT.agree * far + max(SHAFT.longest_effort_lag, period) * np.abs(change) + SHAFT.joint_rest * SHAFT.way
     excess = np.abs(moved - by) - allowed - SHAFT.noisy * piece.noise["position"]
     if 2 * np.sum(excess > 0.0) < width:
         return ""
@@ -166,10 +165,10 @@ def friction(source: Source) -> tuple[Friction, float]:
     some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
     if not some:
         return Friction(), 0.0
-    period = float(some[0].time[1] - some[0].time[0])
+    period = some[0].period
     window = max(SHAFT.window, SHAFT.window_samples * period)
-    # samples between two pieces
-    apart = 2 * round(window / period) + 2 * math.ceil(SHAFT.longest_effort_lag / period) + 2
+    most = math.ceil(CYCLE.longest_lag / period)
+    apart = 2 * round(window / period) + 2 * most + 2  # samples between two pieces
     blank = np.full(apart, math.nan)
     joined = {
         q: np.concatenate([part for piece in some for part in (piece.values[q], blank)])
@@ -188,14 +187,17 @@ def friction(source: Source) -> tuple[Friction, float]:
         return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, use, loads)
 
     width = round(window / period)
-    own, noise = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
+    own, noise, curve = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = bool(weight) and own < SHAFT.apart
-    found, shift = (fit(0), 0) if one_frequency else _best(fit, math.ceil(SHAFT.longest_effort_lag / period))
-    if shift:  # where the effort is filtered, its step at a reversal is no delay
-        before = np.roll(velocity, SHAFT.filtered * abs(shift))
-        settled = fit(shift, np.sign(velocity) == np.sign(before))
-        found = settled if _is_known(settled) else found
-    inertia = found.inertia._replace(error=math.hypot(found.inertia.error, noise * found.inertia.value))
+    found, shift = (fit(0), 0) if one_frequency else _best(fit, most)
+    # where the effort is filtered, its step at a reversal is no delay; nor is one over a way before it slides
+    before = np.roll(velocity, SHAFT.filtered * (abs(shift) or math.ceil(SHAFT.longest_effort_lag / period)))
+    use = np.sign(velocity) == np.sign(before)
+    settled = fit(shift, use)
+    if _is_known(settled) and (shift or settled.residual < SHAFT.much_better * found.residual):
+        found, shift = (settled, shift) if shift or one_frequency else _best(lambda lag: fit(lag, use), most)
+    doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
+    inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 
 
@@ -215,19 +217,22 @@ def _best(fit: Callable[[int], Friction], most: int) -> tuple[Friction, int]:
 
 def _own_acceleration(
     velocity: Numbers, sd: float, load: Numbers, rest: float, width: int, period: float
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Share, rms, of the averaged acceleration that is not alike the columns of a load, and the noise in its power.
 
-    By the share of the noise of the velocity, of a standard deviation, an inertia is too small.
+    By the share of the noise of the velocity, of a standard deviation, an inertia is too small.  Then the mean square
+    of the frequency of the acceleration, 1/s^2.
     """
     kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
     acceleration = np.convolve(velocity, kernel, "same")
     rows = (np.abs(velocity) > rest) & np.isfinite(acceleration) & np.all(np.isfinite(load), axis=1)
     rows[:width] = rows[-width:] = False  # the mean is incomplete
     if np.count_nonzero(rows) < SHAFT.fewest_samples:
-        return 0.0, 1.0
+        return 0.0, 1.0, 0.0
+    curve = np.nansum(np.convolve(acceleration, kernel, "same")[rows] ** 2) / np.sum(acceleration[rows] ** 2)
     columns, wanted = np.column_stack([np.ones(np.count_nonzero(rows)), load[rows]]), acceleration[rows]
     rest_of_it = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
     noise, power = sd**2 * float(kernel @ kernel), float(np.mean(rest_of_it**2))
     own, whole = power - noise, float(np.var(wanted)) - noise
-    return math.sqrt(own / whole) if 0.0 < own < whole else 0.0, min(noise / power, 1.0) if power > 0.0 else 1.0
+    share = math.sqrt(own / whole) if 0.0 < own < whole else 0.0
+    return share, min(noise / power, 1.0) if power > 0.0 else 1.0, curve

@@ -31,6 +31,17 @@ class ForceStep(NamedTuple):
         return abs(self.response.final - self.commanded)
 
 
+def along(measured: Source, command: Source) -> Source:
+    """A command of a single axis, which a number may be, on the axis of the measured force that follows it most."""
+    own, known = command.only(*FORCE), measured.only(*FORCE)
+    if len(own.values) != 1 or not known.values:
+        return command
+    (value,) = own.values.values()
+    wanted = value[row_at(own.time, known.time)]
+    follows = {axis: abs(force @ (wanted - np.mean(wanted))) for axis, force in known.values.items()}
+    return own._replace(values={max(follows, key=follows.__getitem__): value})
+
+
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction.
 
@@ -90,7 +101,12 @@ def step_section(recording: AnalysedRecording) -> Section:
     sentences, findings, doubts, followed = [], [], [], set()
     for one in (one for one in states if not one.is_joint):
         if (command := recording.command_of(one)) is not None:
-            steps += force_steps(one, command)
+            on_axis = along(one, command)
+            doubts += [
+                f"{command.topic} has no {axis}, but {axis} of {one.label} follows it most, and is evaluated."
+                for axis in on_axis.values.keys() - command.values.keys()
+            ]
+            steps += force_steps(one, on_axis)
             followed.add(command.topic)
             continue
         doubts += [

@@ -187,8 +187,7 @@ def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers |
 
 def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
     """A signal less its linear response to a command at the same times."""
-    period = float(piece.time[1] - piece.time[0])
-    lags = np.unique(np.round(np.linspace(0.0, CYCLE.longest_lag / period, CYCLE.lags)).astype(np.int64))
+    lags = np.unique(np.round(np.linspace(0.0, CYCLE.longest_lag / piece.period, CYCLE.lags)).astype(np.int64))
     late = [np.concatenate([np.full(lag, desired[0]), desired[: len(desired) - lag]]) for lag in lags.tolist()]
     columns = np.column_stack([np.ones(len(desired)), piece.time - piece.time[0], *late])
     return value - columns @ np.linalg.lstsq(columns, value, rcond=CYCLE.singular)[0]

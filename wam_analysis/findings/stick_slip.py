@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.foreign.sources import Piece, Source, is_still, pieces, rests
-from wam_analysis.measures.runs import at_rest, runs, with_alone, without_turns
+from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests
+from wam_analysis.measures.runs import at_rest, runs, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT
-from wam_bag.arrays import Mask, Numbers, Rows
+from wam_bag.arrays import Numbers
 
 
 def stick_section(recording: AnalysedRecording) -> Section:
@@ -57,9 +57,8 @@ class Sticking(NamedTuple):
     stuck : fraction of the time at rest.
     slips : motions between; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
-    begins : when each motion began, s; none of a motion back and forth.
+    begins : when each motion began, s.
     shortest : rest that is counted, s.
-    is_turning : whether it is that of a motion back and forth.
     slowest : speed in rad/s or m/s up to which it is at rest, where the noise hides slower motions; else 0.
     """
 
@@ -68,7 +67,6 @@ class Sticking(NamedTuple):
     commanded: float
     begins: tuple[float, ...] = ()
     shortest: float = 0.0
-    is_turning: bool = False
     slowest: float = 0.0
 
     @property
@@ -76,8 +74,7 @@ class Sticking(NamedTuple):
         """How much of the time it was at rest, and how often it moved."""
         if not self.slips:
             return "never moved"
-        turns = ", half the time from one reversal to the next," * self.is_turning
-        counted = f"rests shorter than {shown(self.shortest, 's')}{turns} do not count"
+        counted = f"rests shorter than {shown(self.shortest, 's')} do not count"
         if not self.stuck and self.slips == 1:
             return f"always in motion ({counted})"
         return f"at rest for {100.0 * self.stuck:.0f} % of the time ({counted}), moved {times(self.slips)}"
@@ -88,25 +85,20 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if rests(source):
         return Sticking(1.0, 0, math.nan)
     resting = motions = total = disobeyed = 0
-    shortest, slowest, is_turning = 0.0, 0.0, False
+    shortest, slowest = 0.0, 0.0
     begins: list[float] = []
+    placed = source.only("position")
+    sd = resolution(placed.values["position"]) if len(placed.time) else 0.0
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
         rest, velocity = rest_speed(piece, least), piece.values["velocity"]
         slowest = max(slowest, rest * (rest > least))
-        period = float(piece.time[1] - piece.time[0])
-        least_rows = max(1, round(SHAFT.shortest_phase / period))
-        still = _still(piece, at_rest(velocity, rest, least_rows), least)
+        least_rows = max(1, round(SHAFT.shortest_phase / piece.period))
+        still = at_rest(velocity, rest, least_rows)
         total += len(still)
-        sticks, slips = runs(still), runs(~still)
-        if _only_turns(sticks, slips, velocity):
-            motions, is_turning = motions + 1, True
-            lengths, brief = np.diff(sticks, axis=1), SHAFT.brief * float(np.median(np.diff(slips, axis=1)))
-            resting += int(np.sum(lengths[lengths > brief]))
-            shortest = max(shortest, brief * period)
-            continue
-        shortest = max(shortest, least_rows * period)
-        still = without_turns(still, velocity, rest)
+        shortest = max(shortest, max(least_rows, SHAFT.rest_samples) * piece.period)
+        at = np.interp(piece.time, placed.time, placed.values["position"]) if len(placed.time) else None
+        still = without_turns(still, velocity, rest, at, sd)
         started = piece.time[runs(~still)[:, 0]].tolist()
         resting, motions, begins = resting + int(np.sum(still)), motions + len(started), begins + started
         if command is not None:
@@ -114,31 +106,13 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if not total:
         return None
     unmet = disobeyed / resting if command is not None and resting else math.nan
-    return Sticking(resting / total, motions, unmet, tuple(begins), shortest, is_turning, slowest)
+    return Sticking(resting / total, motions, unmet, tuple(begins), shortest, slowest)
 
 
 def hidden_motion(source: Source) -> float:
     """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
     distance = float(np.ptp(source.only("position").values.get("position", np.zeros(1))))
     return distance if distance > SHAFT.joint_rest * SHAFT.way and not rests(source) else 0.0
-
-
-def _still(piece: Piece, still: Mask, least: float) -> Mask:
-    """The rests without those in which the position goes on, as where its rate is too noisy to show it."""
-    if "position" not in piece.values:
-        return still
-    position, sd, time = piece.values["position"], piece.noise["position"], piece.time
-    return with_alone(still, lambda a, b: is_still(position[a:b], sd, least * float(time[b - 1] - time[a])))
-
-
-def _only_turns(sticks: Rows, slips: Rows, velocity: Numbers) -> bool:
-    """Whether it is one motion back and forth, which is slow for a moment where it turns."""
-    between = sticks[1:-1]
-    goes_back = velocity[between[:, 0] - 1] * velocity[between[:, 1]] < 0.0  # not all turns of a motion are rests
-    if len(slips) < 4 or not len(between) or np.mean(goes_back) < SHAFT.turns:
-        return False
-    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, slips))
-    return rest < SHAFT.brief * motion
 
 
 def rest_speed(piece: Piece, least: float) -> float:

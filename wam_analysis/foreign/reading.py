@@ -180,7 +180,8 @@ def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
     found = []
     for message in columns.messages:
         value = _at(topic, message, path)
-        value = [value.x, value.y, value.z] if hasattr(value, "x") else value
+        if parts := {*getattr(value, "_fields", getattr(value, "__dict__", ()))}:
+            value = [value.x, value.y, value.z] if parts == {*"xyz"} else ""  # not a quaternion
         try:
             found.append(np.atleast_1d(np.asarray(value, np.float64)).ravel())
         except (TypeError, ValueError):
@@ -211,7 +212,7 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
 def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> WrenchColumns:
     parts = []
     for quantity in ("force", "torque"):
-        values = np.zeros((len(columns.messages), 3))
+        values = np.full((len(columns.messages), 3), np.nan)
         for k, row in enumerate(_numbers(topic, columns, fields[quantity]) if quantity in fields else ()):
             part = row[3:] if quantity == "torque" and len(row) == 6 else row[:3]
             values[k, : len(part)] = part

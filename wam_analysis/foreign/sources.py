@@ -35,6 +35,7 @@ class Treatment(StrEnum):
     UNFILLED = "the {quantity} is 0 in every message although the position moves; the rate of that is used"
     LATE = "the {quantity} is about {size}, as by a filter; the rate of the position is used"
     SCALED = "the {quantity} is {factor:.3g} times the rate of the position; that rate is used"
+    SPIKES = "the {quantity} jumps away and back {times}, by up to {size}; the mean of its neighbours is used"
     SPARSE = "{quantity} in only {share} of {of} messages"
 
 
@@ -137,6 +138,11 @@ class Piece(NamedTuple):
     noise: dict[str, float]
     stamps: Numbers
     recorded: dict[str, Numbers]
+
+    @property
+    def period(self) -> float:
+        """From sample to sample, s."""
+        return float(self.time[1] - self.time[0])
 
 
 def _last(stamps: Numbers, time: Numbers) -> Numbers:
@@ -258,7 +264,7 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     every = np.ones(len(frames), dtype=bool)
     if isinstance(columns, JointColumns) or len(masks) == 1:
         return [(next(iter(masks)), every, every)]
-    nothing = ~np.any(np.hstack([columns.force, columns.torque]), axis=1)
+    nothing = ~np.any(np.nan_to_num(np.hstack([columns.force, columns.torque])), axis=1)
     acting = {frame: mask | nothing for frame, mask in masks.items() if not np.all(nothing[mask])}
     return [(frame, mask, every) for frame, mask in (acting or {next(iter(masks)): every}).items()]
 
@@ -327,6 +333,12 @@ def _treated(one: Source) -> Source:
             values["position"] = values["position"].copy()
             values["position"][known] = unwrapped
             treated.append(Treated(Treatment.WRAPPED, "position", wraps, len(unwrapped), turn))
+    for quantity, value in values.items():
+        if not one.is_command and len(rows := _spikes(value)):
+            values[quantity] = value.copy()
+            values[quantity][rows] = 0.5 * (value[rows - 1] + value[rows + 1])
+            size = np.max(np.abs(value - values[quantity])[rows])
+            treated.append(Treated(Treatment.SPIKES, quantity, len(rows), len(value), size))
     if "position" in values and not one.is_command:
         shown = one._replace(values=values).only("position", "velocity")
         jumps = _jumps(shown)
@@ -340,6 +352,18 @@ def _treated(one: Source) -> Source:
         treated.append(unfit)
         factor = math.nan
     return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
+
+
+def _spikes(value: Numbers) -> Index:
+    """Rows of single samples away from both neighbours, by more than all others extend over."""
+    value = np.where(np.isfinite(value), value, math.nan)
+    steps = np.diff(value)
+    away = np.where(steps[1:] * steps[:-1] < 0.0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
+    if len(away) < SHAFT.fewest_samples:
+        return np.zeros(0, np.int64)
+    ends = STREAM.repeated, 1.0 - STREAM.repeated
+    reach = np.ptp(np.nanquantile(value, ends))
+    return np.flatnonzero(away > max(reach, STREAM.zero * np.quantile(away, ends[1]))) + 1
 
 
 def _held_over(value: Numbers) -> Mask:
@@ -456,7 +480,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
             continue
         values = {q: v[begin:end] for q, v in source.values.items()}
         stamps, recorded = time, values
-        if float(np.max(np.abs(np.diff(time) - period))) > STREAM.irregular * period:
+        if np.max(np.abs(np.diff(time) - period)) > STREAM.irregular * period:
             even = np.linspace(time[0], time[-1], count)
             values = {q: np.interp(even, time, v) for q, v in values.items()}
             time = even
@@ -480,9 +504,9 @@ def resolution(value: Numbers) -> float:
     is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(np.diff(value)) < np.std(value)
     is_rounded = not is_step and np.all(np.abs(counts - np.rint(counts)) < 0.05) and np.median(counts) < 1e3
     sd = noise(value)
-    # of fourth differences: with few samples in a period the second ones are of the motion
+    # of higher differences, too: with few samples in a period, as of a vibration, the second ones are of the motion
     if len(value) > SHAFT.fewest_samples:
-        sd = min(sd, noise(np.diff(value, n=2)) * math.sqrt(6.0 / 70.0))
+        sd = min(sd, *(noise(np.diff(value, n=m - 2)) * math.sqrt(6.0 / math.comb(2 * m, m)) for m in (4, 6, 8)))
     return max(sd, quantum / math.sqrt(12.0) if is_rounded else 0.0)
 
 
@@ -492,7 +516,7 @@ def rests(source: Source) -> bool:
     if not len(position):
         return False
     sd = resolution(position)
-    return is_still(position, sd) and float(np.ptp(position)) <= SHAFT.far * sd
+    return is_still(position, sd) and bool(np.ptp(position) <= SHAFT.far * sd)
 
 
 def is_still(position: Numbers, sd: float, way: float = 0.0) -> bool:
@@ -535,12 +559,12 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
     shown = source.only("position", "velocity")
     has_both = len(shown.values) == 2 and not rests(source)
     for piece in pieces(shown) if has_both else ():
-        period = float(piece.time[1] - piece.time[0])
-        width = max(1, round(STREAM.averaged / period))
+        width = max(1, round(STREAM.averaged / piece.period))
         if len(piece.time) > width + 1:
-            rate, mean = (way / (width * period) for way in ways(piece, width))
-            moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["position"] / (width * period))
-            parts.append(np.column_stack([mean, rate, np.gradient(rate, period)])[moves])
+            span = width * piece.period
+            rate, mean = (way / span for way in ways(piece, width))
+            moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["position"] / span)
+            parts.append(np.column_stack([mean, rate, np.gradient(rate, piece.period)])[moves])
     velocity, rate, change = np.vstack(parts).T
     if len(rate) and not np.any(recorded := shown.values["velocity"]):
         return 0.0, Treated(Treatment.UNFILLED, "velocity")
@@ -553,12 +577,12 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
         for each in (now * rate, before * change, change, velocity - columns @ (now, before))
     )
     factor = math.copysign(math.hypot(kept, lost), now)
-    # of noise, slips, and what few samples hide of a motion
-    doubt = SHAFT.late + left + float(np.sum(np.diff(recorded) ** 2) / np.sum(recorded**2)) / 6.0
+    hidden = np.sum(np.diff(recorded) ** 2) / np.sum(recorded**2) / 6.0  # by few samples of a motion
+    doubt = SHAFT.late + left + hidden  # of noise and slips, too
     lag = math.atan2(lost, kept) / slope if before < 0.0 < slope else 0.0
     if abs(factor - 1.0) > SHAFT.agree:
-        return factor, None  # they contradict each other
-    if lost > doubt and lag > float(np.median(np.diff(source.time))):
+        return factor if abs(factor - 1.0) > SHAFT.agree + hidden else math.nan, None  # they contradict each other
+    if lost > doubt and lag > np.median(np.diff(source.time)):
         return factor, Treated(Treatment.LATE, "delay of the velocity", size=lag)
     return factor, Treated(Treatment.SCALED, "velocity", size=factor) if abs(factor - 1.0) > doubt else None
 
@@ -566,7 +590,7 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
 def ways(piece: Piece, width: int) -> tuple[Numbers, Numbers]:
     """By how much a joint moves in so many periods, by its position and by its recorded velocity."""
     position, velocity = piece.values["position"], piece.values["velocity"]
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) * (piece.time[1] - piece.time[0])
+    steps = 0.5 * (velocity[1:] + velocity[:-1]) * piece.period
     by = np.concatenate(([0.0], np.cumsum(steps)))
     return position[width:] - position[:-width], by[width:] - by[:-width]
 

@@ -178,12 +178,15 @@ def _require_one_run(path: Path, times: Times, series: Mapping[str, Any]) -> Non
         raise BagError(
             f"{path}: the time is the same in all {len(times)} rows; name its column with --map stamp=COLUMN"
         )
-    again = np.flatnonzero(np.diff(times) < -STREAM.reset)
-    if 0 < len(again) <= STREAM.repeated * len(times):
-        back = (times[again[0]] - times[again[0] + 1]) / 1e9
+    steps = np.diff(times)
+    behind = np.maximum.accumulate(times) - times > STREAM.filled * np.median(np.abs(steps)) if len(steps) else steps
+    back = np.count_nonzero(steps < -STREAM.reset)
+    is_run = np.count_nonzero(behind) >= STREAM.near and np.mean(steps >= 0) >= STREAM.evenly
+    if is_run or 0 < back <= STREAM.repeated * len(times):
+        row = int(np.argmin(steps)) + 1
         raise BagError(
-            f"{path}: after {again[0] + 1} rows the time goes back by {back:.4g} s, as where a second recording "
-            "begins; give each by itself"
+            f"{path}: after {row} rows the time goes back by {-steps[row - 1] / 1e9:.4g} s, as where a second "
+            "recording begins; give each by itself"
         )
     rows = times.tolist()
     instants = len({*rows})

@@ -61,6 +61,9 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             elif goes_on or _changes(time[inner], flat[inner], period):
                 transients.append(_Transient(first, last, period, _width(time, period)))
                 free[first:last] = False  # its last part is no limit cycle
+            elif cycle.cycles >= 4 * CYCLE.episode_cycles:  # a step disturbs it elsewhere
+                found.append(Episode(float(time[begin]), float(time[begin + length - 1]), cycle))
+                free[rows] = False
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
 

@@ -17,7 +17,7 @@ class SpectralLine(NamedTuple):
 
 
 def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLine]:
-    """The strongest lines of a spectrum, the strongest first.
+    """The strongest lines of a spectrum, and the strongest within two octaves, as of a vibration next to a slow motion.
 
     A line is a maximum of the Hann periodogram that noise does not explain whose power is a power of the frequency
     among the neighbours, so that drift is none.  Its frequency is that of a parabola through the logarithms of three
@@ -38,11 +38,8 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     found: list[SpectralLine] = []
     for k in peaks[np.argsort(-power[peaks])].tolist():
-        if (
-            k < CYCLE.first_line
-            or len(found) == most
-            or (found and amplitude[k] < CYCLE.clear_line * found[0].amplitude)
-        ):
+        is_clear = not found or (len(found) < most and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
+        if k < CYCLE.first_line or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
             continue
         if power[k] < (math.log(n / 2) + CYCLE.sure_line) * _noise(power, k):
             continue

@@ -1,7 +1,5 @@
 """Intervals in which a condition holds, usual and missing times, and the noise of a signal."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -94,14 +92,6 @@ def without_short(mask: Mask, shortest: int) -> Mask:
     return kept
 
 
-def with_alone(mask: Mask, holds: Callable[[int, int], bool]) -> Mask:
-    """The mask with those of its intervals alone for whose rows [begin, end) a condition holds."""
-    found = np.zeros_like(mask)
-    for begin, end in runs(mask).tolist():
-        found[begin:end] = holds(begin, end)
-    return found
-
-
 def at_rest(velocity: Numbers, rest: float, shortest: int) -> Mask:
     """Whether a shaft sticks or slips at each sample, (n,).
 
@@ -121,26 +111,42 @@ def at_rest(velocity: Numbers, rest: float, shortest: int) -> Mask:
     return without_short(np.abs(velocity) <= rest, shortest)
 
 
-def without_turns(still: Mask, velocity: Numbers, rest: float) -> Mask:
+def without_turns(
+    still: Mask, velocity: Numbers, rest: float, position: Numbers | None = None, sd: float = 0.0
+) -> Mask:
     """The rests without those in which a smooth motion only turns back or is slow, as a slow sine does.
 
     Such a motion passes through the speeds of rest evenly, or does not come near zero; a shaft that sticks is at zero
-    for most of the time.
+    for most of the time, and then leaves its place faster than a parabola would.
 
     Parameters
     ----------
     still : (n,), see `at_rest`.
     velocity : (n,), rad/s or m/s.
     rest : speed up to which it was counted as at rest.
+    position, sd : (n,), and the standard deviation of its noise, which hides a turn; None for the way of the velocity.
     """
+    at = np.cumsum(velocity) if position is None else position
 
     def sticks(begin: int, end: int) -> bool:
         if not begin or end == len(velocity):
-            return True
-        part = 50.0 if velocity[begin - 1] * velocity[end] < 0.0 else 5.0
-        return bool(np.percentile(np.abs(velocity[begin:end]), part) <= SHAFT.passing * rest)
+            return end - begin >= SHAFT.rest_samples
+        quiet = begin + np.flatnonzero(np.abs(velocity[begin:end]) <= SHAFT.passing * rest)
+        if len(quiet) < SHAFT.rest_samples:
+            return False
+        first, last = quiet[[0, -1]]
+        count = last - first
+        is_longer = np.any(still[max(begin - count, 0) : begin]) and np.any(still[end : end + count])
+        if is_longer or not count <= first <= last < len(at) - count:  # it rests for longer than it moves
+            return 2 * len(quiet) >= end - begin
+        ways = [np.ptp(at[first - count : first + 1]), np.ptp(at[last : last + count + 1])]
+        inside = np.ptp(np.percentile(at[first : last + 1], (5.0, 95.0)))
+        return bool(max(ways) > SHAFT.turn * max(inside, SHAFT.noisy * sd))
 
-    return with_alone(still, sticks)
+    kept = np.zeros_like(still)
+    for begin, end in runs(still).tolist():
+        kept[begin:end] = sticks(begin, end)
+    return kept
 
 
 def noise(value: Numbers) -> float:
