@@ -33,7 +33,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     "config": ("wam", "name of an installed configuration (wam, testbed), or path of a YAML file", None),
     "overrides": (
         "",
-        "values in place of the configuration's: 'force_loop:force_gain=[0.01]; timing.period=0.002'",
+        "values in place of the configuration's: 'force_loop:force_gain=[0.01]; arm.payload=0.3'",
         None,
     ),
     "namespace": (NAMESPACE, "namespace of the arm; a second arm on this machine needs another one", None),

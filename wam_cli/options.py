@@ -154,7 +154,7 @@ def take_configuration(parser: argparse.ArgumentParser, default: str | None = BA
         action="append",
         default=[],
         metavar="[NODE:]PARAMETER=VALUE",
-        help="change a parameter, e.g. force_loop:force_gain=[0.01] or timing.period=0.002; may be repeated",
+        help="change a parameter, e.g. force_loop:force_gain=[0.01] or arm.payload=0.3; may be repeated",
     )
 
 
