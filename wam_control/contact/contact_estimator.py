@@ -34,8 +34,8 @@ class ContactEstimatorParameters:
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
     detect: float = parameter(
-        "value of r^T S^-1 r of the external torques; a contact is detected above it in two periods, or above twice "
-        "this value in one",
+        "value of r^T S^-1 r (see docs/estimator.md); a contact is detected above it in two outer periods, or above "
+        "twice this value in one",
         high=1e6,
     )
     release: float = parameter("value of r^T S^-1 r below which the contact has ended", high=1e6)

@@ -16,9 +16,9 @@ class ObserverParameters:
         high=1.0,
     )
     mass_scale: tuple[float, ...] = parameter(
-        "factor on mass and inertia of each link in the estimator's model", low=0.1, high=10.0
+        "factor on mass and inertia of each link in the estimator's model; 1: no deliberate error", low=0.1, high=10.0
     )
-    friction_scale: float = parameter("factor on the friction in the estimator's model", high=10.0)
+    friction_scale: float = parameter("the same for friction", high=10.0)
     mass_uncertainty: float = parameter(
         "sd of the error of the modelled torques of gravity and of inertia, as a fraction of them", high=1.0
     )
