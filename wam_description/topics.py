@@ -249,7 +249,7 @@ TOPICS: Final = (
     _joints(
         "joint_torque_command",
         "outer",
-        "joint torques that your program commands, N m, in place of force and posture",
+        "torque of each joint on the world, N m, in place of force and posture",
     ),
     Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero ends it"),
     Topic(
@@ -309,8 +309,7 @@ TOPICS: Final = (
         "contact/hypotheses",
         TABLE,
         "outer",
-        "one row per hypothesis, the most probable first; no row without contact; float64 columns: see "
-        "docs/estimator.md",
+        "one row per link, the most probable first; no row without contact; float64 columns: see docs/estimator.md",
         columns=HYPOTHESIS_COLUMNS,
         is_viewed=True,
     ),
