@@ -19,8 +19,7 @@ from wam_description.configuration import Configuration
 from wam_description.parameters import parameter
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 from wam_sim.simulation import Simulation
 
 

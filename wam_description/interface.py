@@ -11,10 +11,20 @@ from wam_description.configuration import Configuration
 from wam_description.defects import Check, UnusableOutput, defect_finder, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE, installation
 from wam_description.parameters import ParameterError, meant
-from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
+from wam_description.synchroniser import InputSpec, Synchroniser
 from wam_description.thresholds import FILES, INPUTS
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
-from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
+from wam_description.wiring import (
+    WHOLE,
+    Declaration,
+    Input,
+    Inputs,
+    Outputs,
+    Reaction,
+    declaration,
+    needed_arrays,
+    raised,
+)
 
 BETWEEN = (
     "it is sent at the outer rate, but this step, one for each {}, is between two outer periods: no node would use it; "

@@ -20,11 +20,12 @@ Nothing is used that is from the future, too old, or from before the driver's se
 """
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
 from wam_description.thresholds import INPUTS
+from wam_description.wiring import Inputs, Origin
 
 
 class OutOfTime(ValueError):
@@ -55,46 +56,6 @@ class InputSpec(NamedTuple):
 
 
 TRIGGER = InputSpec(outer=True)
-Origin = tuple[int, Collection[str]]
-
-
-class Inputs(dict[str, Any]):
-    """The inputs of one step, by topic: None where there is none, it is too old, or this arm does not have the topic.
-
-    A dictionary answers in a quarter of the time of a method of ours, and nodes read nine times in a period.
-
-    Attributes
-    ----------
-    stamp : time of the trigger, ns.
-    dt : time since the step before, s; the nominal period at the first step.
-    origins : stamps, ns, each with the topics whose inputs have it.
-    """
-
-    __slots__ = ("dt", "origins", "stamp")
-    stamp: int
-    dt: float
-    origins: list[Origin]
-
-    @classmethod
-    def of(cls, stamp: int, dt: float, taken: Mapping[str, tuple[int, Any] | None]) -> "Inputs":
-        """Inputs made by hand: time of the trigger, ns, since the step before, s, and stamp and value by topic."""
-        inputs = cls({topic: found and found[1] for topic, found in taken.items()})
-        inputs.stamp, inputs.dt = stamp, dt
-        inputs.origins = [(found[0], (topic,)) for topic, found in taken.items() if found is not None]
-        return inputs
-
-    def __missing__(self, topic: str) -> None:
-        """Return None for a topic that has no input in this step."""
-
-    def stamp_of(self, topic: str) -> int:
-        """Stamp of an input, ns; that of the trigger where there is none."""
-        return next((stamp for stamp, topics in self.origins if topic in topics), self.stamp)
-
-    def age(self, topic: str) -> float:
-        """Time from the state that caused an input to the trigger, s; 0 where there is none."""
-        return seconds(self.stamp - self.stamp_of(topic))
-
-
 Inlet = Callable[[int, Any], Sequence[Inputs]]
 
 
@@ -390,24 +351,25 @@ class Synchroniser:
         Where it waits, `_lacks` is the group that lacks one, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        inputs = Inputs()
-        inputs.origins = origins = []
+        found: dict[str, Any] = {}
+        origins: list[Origin] = []
         for group in self._groups:  # before the others: most often it is one of these that is not there yet
             if stamp >= group.until and not group.find(stamp) and not self._is_overdue(group, group.cause(stamp)):
                 self._lacks = group, group.cause(stamp), min([each.cause(stamp) for each in self._groups])
                 return None
-            inputs.update(group.found)
+            found.update(group.found)
             origins.append(group.origin)
         for topic, newest in self._newest.items():
-            if (found := newest.taken(stamp)) is None:
-                inputs[topic] = None
-            else:
-                inputs[topic] = found[1]
-                origins.append((found[0], (topic,)))
-        inputs[self._trigger] = value
+            taken = newest.taken(stamp)
+            found[topic] = taken and taken[1]
+            if taken:
+                origins.append((taken[0], (topic,)))
+        found[self._trigger] = value
         before, self._last_done = self._last_done, stamp
         is_next = not before or stamp - before == self._period
+        inputs = Inputs(found)
         inputs.stamp, inputs.dt = stamp, self._nominal if is_next else seconds(stamp - before)
+        inputs.origins = origins
         return inputs
 
 
@@ -503,7 +465,7 @@ class _Group:
         self.newest = 0
         self._begin = max(begin, 1)
         self.found: dict[str, Any] = {}
-        self.origin: Origin = (0, ())
+        self.origin: Any = (0, ())  # an object, which each step takes as it is
         self.until = 0
 
     def cause(self, stamp: int) -> int:

@@ -33,17 +33,56 @@ topics : rows of the table of topics that this node adds.
 
 import importlib
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from wam_description.arm import Shared
+from wam_description.arm import Shared, seconds
 from wam_description.parameters import ParameterError
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
 from wam_description.topics import EVERY_NODE, Topic
 
 Outputs = Mapping[str, Any]  # value by topic
 WHOLE = "position velocity effort"  # arrays of a JointState
+Origin = tuple[int, Collection[str]]
+
+
+class Inputs(dict[str, Any]):
+    """The inputs of one step, by topic: None where there is none, it is too old, or this arm does not have the topic.
+
+    A dictionary answers in a quarter of the time of a method of ours, and nodes read nine times in a period.
+
+    Attributes
+    ----------
+    stamp : time of the trigger, ns.
+    dt : time since the step before, s; the nominal period at the first step.
+    origins : stamps, ns, each with the topics whose inputs have it.
+    """
+
+    __slots__ = ("dt", "origins", "stamp")
+    stamp: int
+    dt: float
+    origins: list[Origin]
+
+    @classmethod
+    def of(cls, stamp: int, dt: float, taken: Mapping[str, tuple[int, Any] | None]) -> "Inputs":
+        """Inputs made by hand: time of the trigger, ns, since the step before, s, and stamp and value by topic."""
+        inputs = cls({topic: found and found[1] for topic, found in taken.items()})
+        inputs.stamp, inputs.dt = stamp, dt
+        inputs.origins = [(found[0], (topic,)) for topic, found in taken.items() if found is not None]
+        return inputs
+
+    def __missing__(self, topic: str) -> None:
+        """Return None for a topic that has no input in this step."""
+
+    def stamp_of(self, topic: str) -> int:
+        """Stamp of an input, ns; that of the trigger where there is none."""
+        return next((stamp for stamp, topics in self.origins if topic in topics), self.stamp)
+
+    def age(self, topic: str) -> float:
+        """Time from the state that caused an input to the trigger, s; 0 where there is none."""
+        return seconds(self.stamp - self.stamp_of(topic))
+
+
 Method = TypeVar("Method", bound=Callable[[Any, Inputs], Outputs])
 
 

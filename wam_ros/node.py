@@ -21,9 +21,9 @@ from wam_description.event_text import news, sentence
 from wam_description.interface import Feed, declared
 from wam_description.signals import NodeStatus
 from wam_description.status import REFUSED
-from wam_description.synchroniser import CURE, Inputs, OutOfTime, Synchroniser
+from wam_description.synchroniser import CURE, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
-from wam_description.wiring import Declaration, Outputs, mask, needed_arrays
+from wam_description.wiring import Declaration, Inputs, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
 from wam_ros.health import WAITING
 from wam_ros.limits import NODE_LIMITS

@@ -24,9 +24,8 @@ from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part
 from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
-from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
-from wam_description.wiring import Declaration, Outputs
+from wam_description.wiring import Declaration, Inputs, Outputs
 from wam_sim.bus import Bus, TopicValue, flat
 from wam_sim.recorded_run import RecordedRun, recorded_run
 

@@ -19,9 +19,9 @@ from wam_description.event_text import news
 from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build
 from wam_description.signals import NodeStatus, State
-from wam_description.synchroniser import Inputs, Synchroniser
+from wam_description.synchroniser import Synchroniser
 from wam_description.topics import STATUS
-from wam_description.wiring import Call, Declaration, Outputs, SetParameters
+from wam_description.wiring import Call, Declaration, Inputs, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import unpublished
 from wam_driver.safety import Mode

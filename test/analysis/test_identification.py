@@ -29,8 +29,8 @@ from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError, build
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
+from wam_description.wiring import Inputs
 from wam_sim.recorded_run import recorded_run
 from wam_studies.identification.study import IdentificationTrial, run_trial
 

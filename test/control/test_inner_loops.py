@@ -15,7 +15,7 @@ from wam_control.velocity.velocity_loop import VelocityLoop, VelocityLoopParamet
 from wam_description.arm import Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import ForceCommand, State
-from wam_description.synchroniser import Inputs
+from wam_description.wiring import Inputs
 from wam_sim.replay import replay
 from wam_sim.simulated_bag import record
 from wam_studies.figures.inner_loops import LOOPS, damped_testbed, largest_gain, on_position, on_torque, period_map

@@ -33,8 +33,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, parameter
 from wam_description.signals import NO_CONTACT, ZERO, Contact, PathPoint, PosturePath, State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Call, Input, Outputs, reaction
+from wam_description.wiring import Call, Input, Inputs, Outputs, reaction
 from wam_sim.simulation import Simulation
 
 

@@ -12,7 +12,8 @@ from wam_description.event import Level
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.signals import NodeStatus, State, Wrench
-from wam_description.synchroniser import Inputs, InputSpec, OutOfTime, Synchroniser
+from wam_description.synchroniser import InputSpec, OutOfTime, Synchroniser
+from wam_description.wiring import Inputs
 from wam_driver.session import Session
 from wam_sim.simulation import Simulation
 

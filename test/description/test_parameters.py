@@ -20,8 +20,7 @@ from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build, fields, like, parameter, require, values
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_description.wiring import Input, Inputs, Outputs, declaration, reaction
 from wam_description.wiring import SetParameters as SetParametersRequest
 from wam_ros.node import AdaptedNode, make_node, parameter_file
 from wam_ros.requests import answer_of

@@ -14,9 +14,8 @@ from wam_description.arm import Shared
 from wam_description.event import Level
 from wam_description.parameters import Nothing, ParameterError, parameter
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, JOINT_STATE, TASK_COLUMNS, Topic
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 from wam_ros.testing import ArmFault, RunningArm, configured
 from wam_ros.wire import encoder
 

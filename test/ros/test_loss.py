@@ -15,9 +15,8 @@ from wam_description.arm import Shared
 from wam_description.event import Level
 from wam_description.parameters import Nothing
 from wam_description.signals import NodeStatus, State
-from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 from wam_driver.safety import Mode
 from wam_ros.long_steps import LongStep, Steps
 from wam_ros.messages import diagnostic_status, joint_state, message_type

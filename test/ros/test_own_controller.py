@@ -18,9 +18,8 @@ from wam_description.event import Level
 from wam_description.interface import Interface, declared, require_parameters
 from wam_description.parameters import Nothing, ParameterError
 from wam_description.signals import ForceCommand, NodeStatus, State, Table, Wrench
-from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, JOINT_STATE, TABLE, WRENCH, Topic
-from wam_description.wiring import Call, Input, Outputs, reaction
+from wam_description.wiring import Call, Input, Inputs, Outputs, reaction
 from wam_ros import requests
 from wam_ros.testing import RunningArm, playing
 from wam_sim.replay import replay

@@ -19,8 +19,7 @@ from wam_description.signals import (
     Wrench,
 )
 from wam_description.status import ENABLED
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
 class ContactEstimatorNode:

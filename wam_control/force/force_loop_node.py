@@ -15,8 +15,7 @@ from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.status import REFUSED
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
 class ForceLoopNode:

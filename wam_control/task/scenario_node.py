@@ -11,8 +11,7 @@ from wam_description.event import Code, Event, Level
 from wam_description.event_text import sentences
 from wam_description.signals import BASE, NodeStatus, State, Wrench
 from wam_description.status import ENABLED
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
+from wam_description.wiring import Call, Input, Inputs, Outputs, SetParameters, reaction
 
 BRAKED = (
     "it commanded the arm, and the brakes were on; give it, or a step before it, 'request: enable', or enable the arm "

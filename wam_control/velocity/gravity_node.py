@@ -4,8 +4,7 @@ from wam_description.arm import Shared
 from wam_description.parameters import Nothing
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
 class GravityNode:

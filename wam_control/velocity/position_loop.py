@@ -12,8 +12,7 @@ from wam_control.velocity.velocity_loop import SERVO_REACTION
 from wam_description.arm import Servo, Shared
 from wam_description.parts import Motors
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Outputs
+from wam_description.wiring import Inputs, Outputs
 
 
 class PositionLoop:

@@ -12,8 +12,7 @@ from wam_description.arm import Shared
 from wam_description.parameters import lengths, parameter
 from wam_description.parts import Motors
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from wam_control.velocity.transform import Transform, TransformParameters
 from wam_description.arm import Shared
 from wam_description.event import Level
 from wam_description.signals import NodeStatus, State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 HELD: Final = NodeStatus(
     Level.WARN,

@@ -8,9 +8,8 @@ from wam_control.velocity.servo_guard import ServoGuard
 from wam_control.velocity.velocity_loop import SERVO_REACTION, VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Shared
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
-from wam_description.wiring import Outputs
+from wam_description.wiring import Inputs, Outputs
 
 
 class VelocityLoopNode:

@@ -16,8 +16,7 @@ from wam_description.arm import Shared
 from wam_description.event import OBEYED, Event
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import State
-from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
 class UsualController:
