@@ -199,7 +199,7 @@ def _columns(jacobian: Array) -> Array:
 def _vector(values: ArrayLike) -> Array:
     if type(values) is np.ndarray and values.dtype is FLOAT:  # most are: a fifth of the time of asarray
         return values
-    return np.asarray(values, dtype=float)
+    return np.asarray(values, FLOAT)
 
 
 def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:

@@ -1,4 +1,7 @@
-"""Topics without ROS, of a simulation or a replay: each message goes at once to every reaction that takes it."""
+"""Topics without ROS, of a simulation or a replay: each message goes at once to every reaction that takes it.
+
+A stamp is a number, ns, that only passes through here; as `Any` it need not become one of C and back in each function.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
@@ -39,7 +42,7 @@ class Bus:
         self._rows: Rows = {}
         self._outlets: dict[str, _Outlets] = {}  # by node
 
-    def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
+    def listen(self, topic: str, take: "_Take") -> None:
         """Call a function with stamp, ns, and value of each message of a topic."""
         self._takers[topic].append(take)
 
@@ -70,7 +73,7 @@ class Bus:
         for name, output in outputs.items():
             self._outlets[node][name](stamp, output)
 
-    def publish(self, topic: str, stamp: int, value: Any) -> None:
+    def publish(self, topic: str, stamp: Any, value: Any) -> None:
         """Publish a value of a stamp, ns, and what the nodes publish in turn."""
         for take in self._takers[topic]:
             take(stamp, value)
@@ -79,7 +82,7 @@ class Bus:
         """What `publish` does on one topic, as a function of stamp and value."""
         takers = self._takers.setdefault(topic, [])
 
-        def publish(stamp: int, value: Any) -> None:
+        def publish(stamp: Any, value: Any) -> None:
             for take in takers:
                 take(stamp, value)
 
@@ -99,7 +102,7 @@ def of_node(node: str, topic: str) -> str:
     return f"{node}: {topic}" if topic in EVERY_NODE else topic
 
 
-_Row = Callable[[Any], tuple[str, Sequence[float]]]  # frame and numbers of a message
+_Row = Callable[[Any, Any], tuple[str, tuple[float, ...]]]  # frame of a message; its stamp, ns, and numbers
 
 
 class _Kept:
@@ -120,16 +123,16 @@ class _Kept:
         self._blocks: list[tuple[str, Struct, list[bytes]]] = []
         self._count, self._frame = -1, ""  # of the present block, none so far
 
-    def add(self, stamp: int, value: Any) -> None:
+    def add(self, stamp: Any, value: Any) -> None:
         """Keep the numbers of a message."""
-        frame, numbers = self._row(value)
+        frame, numbers = self._row(stamp, value)
         if len(numbers) != self._count or frame != self._frame:
             self._begin(len(numbers), frame)
-        self._keep(self._pack(stamp, *numbers))
+        self._keep(self._pack(*numbers))
 
     def _begin(self, count: int, frame: str) -> None:
-        """Begin a block of messages of so many numbers."""
-        layout, messages = Struct(f"q{count}d"), list[bytes]()
+        """Begin a block of messages of so many numbers with the stamp."""
+        layout, messages = Struct(f"q{count - 1}d"), list[bytes]()
         self._blocks.append((frame, layout, messages))
         self._count, self._frame, self._pack, self._keep = count, frame, layout.pack, messages.append
 
@@ -143,8 +146,8 @@ class _Kept:
         ]
 
 
-_Take = Callable[[int, Any], object]
-_Outlet = Callable[[int, Any], None]
+_Take = Callable[[Any, Any], object]
+_Outlet = Callable[[Any, Any], None]
 
 
 class _Outlets(dict[str, _Outlet]):
@@ -176,8 +179,8 @@ def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets:
     One whose newest state is too old refuses it, as over topics; the driver brakes then and names the node.
     """
 
-    def take(stamp: int, value: Any) -> None:
-        done: list[tuple[int, Outputs]] = []
+    def take(stamp: Any, value: Any) -> None:
+        done: list[tuple[Any, Outputs]] = []
         try:
             for inlet, work in reactions:
                 for inputs in inlet(stamp, value):
@@ -192,14 +195,14 @@ def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets:
 
 
 _ROWS: dict[str, _Row] = {
-    JOINT_STATE: lambda value: ("", [*value[0], *value[1], *value[2]]),
-    WRENCH: lambda value: (value.frame, [*value.force, *value.torque]),
-    POINT: lambda value: (value.frame, value.position),
-    TABLE: lambda value: (value.frame, [*chain.from_iterable(value.rows)]),
+    JOINT_STATE: lambda stamp, value: ("", (stamp, *value[0], *value[1], *value[2])),
+    WRENCH: lambda stamp, value: (value.frame, (stamp, *value.force, *value.torque)),
+    POINT: lambda stamp, value: (value.frame, (stamp, *value.position)),
+    TABLE: lambda stamp, value: (value.frame, (stamp, *chain.from_iterable(value.rows))),
 }
 
 
 def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
     """A value of a topic of numbers as one row."""
-    frame, numbers = _ROWS[topic.type](value)
-    return TopicValue(stamp, tuple(numbers), frame)
+    frame, numbers = _ROWS[topic.type](stamp, value)
+    return TopicValue(stamp, numbers[1:], frame)
