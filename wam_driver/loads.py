@@ -55,6 +55,7 @@ class AppliedPush(NamedTuple):
     force: list[float]  # (3,) N, in the frame of the cover
     torque: list[float]  # (3,) N m, about its origin
     load: PartialLoad
+    words: str  # how hard it pushes on which cover
 
 
 class CoverLoads:
@@ -93,13 +94,17 @@ class CoverLoads:
         """Push on a cover, see `Plant.push`."""
         if cover not in self._frame:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._frame)}")
+        if cover in self.pushes and self.pushes[cover][2:4] == (list(force), list(torque)):
+            return  # most often
         if any(force) or any(torque):
             pushed, turned = np.array(force, float), np.array(torque, float)
             (_, fy, fz), (_, ty, tz) = at_frame = pushed.tolist(), turned.tolist()
             square = fy * fy + fz * fz  # a force along x passes through every position
             position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
             load = PartialLoad(pushed, turned, position)
-            self.pushes[cover] = AppliedPush(self._site[cover], self._frame[cover].body, *at_frame, load)
+            size, unit = (force, "N") if any(force) else (torque, "N m")
+            words = f"{math.hypot(*size):.4g} {unit} on {cover}"
+            self.pushes[cover] = AppliedPush(self._site[cover], self._frame[cover].body, *at_frame, load, words)
         else:
             self.pushes.pop(cover, None)
 
@@ -109,15 +114,11 @@ class CoverLoads:
 
     def pushes_in_words(self) -> str:
         """How hard which covers are pushed; '' where none is."""
-        sizes = (
-            (cover, one.force, "N") if any(one.force) else (cover, one.torque, "N m")
-            for cover, one in self.pushes.items()
-        )
-        return ", ".join(f"{math.hypot(*size):.4g} {unit} on {cover}" for cover, size, unit in sizes)
+        return ", ".join([push.words for push in self.pushes.values()])
 
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
-        for cover, (_, body, (x, y, z), (u, v, w), _) in self.pushes.items():
+        for cover, (_, body, (x, y, z), (u, v, w), *_) in self.pushes.items():
             frame = self._frame[cover]
             (a, b, c), (d, e, f), (g, h, i) = frame.rotation.tolist()
             self._turn(
