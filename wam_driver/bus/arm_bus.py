@@ -74,9 +74,10 @@ class ArmBus:
     @property
     def advice(self) -> str:
         """What a person has to do, in words; '' where nothing."""
-        woken = ", ".join(map(str, self._host.woken))
-        reason = f"; motor controllers that lost their position: {woken}" if woken and self.wait is Wait.HOME else ""
-        return self.wait.value + reason
+        woken = self._host.woken
+        if woken and self.wait is Wait.HOME:
+            return f"{self.wait.value}; motor controllers that lost their position: {', '.join(map(str, woken))}"
+        return self.wait.value
 
     def brake(self, on: bool) -> None:
         """Command zero torque and let the windings brake, or not; this arm has no brakes, it sinks."""

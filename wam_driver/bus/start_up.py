@@ -121,7 +121,8 @@ class StartUp(Host):
         if node == BUS.motors and "POLES" in properties.numbers(self.versions[node]):
             demand(node, "POLES", [maker["POLES"]], BusFault.WRIST)
         for name in ("PIDX", "GRPA", "GRPB", "GRPC"):
-            demand(node, name, [maker[name]], BusFault.INDEX)
+            if (found := demand(node, name)) != maker[name]:
+                raise Trouble(BusFault.INDEX, node, f"{name}, which is {found}, to {maker[name]}")
         turn = demand(node, "CTS", BUS.encoders, BusFault.COUNTS)
         usual = range(int(maker["IPNM"] / BUS.gain_ratio), int(maker["IPNM"] * BUS.gain_ratio))
         if (gain := demand(node, "IPNM")) not in usual:
