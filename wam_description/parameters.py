@@ -296,7 +296,11 @@ def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
 
     if field.kind is str or field.kind is bool:
         if not isinstance(value, field.kind):
-            raise refuse("true, false" if field.kind is bool else f"a text in quotes, as '{value}'")
+            raise refuse(
+                "true, false"
+                if field.kind is bool
+                else f"{field.allowed or 'a text'}, in quotes, in a shell as \"'a'\""
+            )
         if field.choices and value not in field.choices:
             raise refuse(field.allowed)
         return value

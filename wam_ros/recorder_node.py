@@ -244,8 +244,8 @@ class RecordedStack:
         own, mode = shared.timing.mode, given.get("timing.mode", shared.timing.mode)
         others = set(shared.nodes).symmetric_difference(given.get("nodes", shared.nodes)) - {RECORDER}
         found = [f"node {node} runs in {mode}, and this recorder in {own}"] * (mode != own)
-        only = ", ".join(sorted(others))
-        found += [f"only one of node {node} and this recorder has {only} in 'nodes'"] * bool(others)
+        if others:
+            found.append(f"only one of node {node} and this recorder has {', '.join(sorted(others))} in 'nodes'")
         advice = "start the recorder with 'wam bag record', which takes both from the running stack"
         return "; ".join([*found, advice]) if found else ""
 

@@ -65,7 +65,7 @@ GOOD: dict[str, Any] = {
         ({"inner.gain": None, "inner.gian": 0.5}, "missing parameter 'inner.gain'; unknown parameter 'inner.gian'"),
         ({"count": None, "mode": None}, "missing parameter 'mode'; missing parameter 'count'"),
         ({"mode": "medium"}, "parameter 'mode' is 'medium'; allowed: one of soft, hard"),
-        ({"mode": 3}, "parameter 'mode' is 3; allowed: a text in quotes, as '3'"),
+        ({"mode": 3}, "parameter 'mode' is 3; allowed: one of soft, hard, in quotes, in a shell as \"'a'\""),
         ({"count": 0}, "parameter 'count' is 0; allowed: 1 to 9"),
         ({"count": 2.5}, "parameter 'count' is 2.5; allowed: a whole number"),
         ({"count": True}, "parameter 'count' is True; allowed: a number"),

@@ -106,8 +106,8 @@ def _add(parser: argparse.ArgumentParser, one: Field[Any]) -> None:
         parser.add_argument(name, nargs="+", choices=choices, default=default, metavar="NAME", help=text)
     else:
         kind: Any = type(default)
-        within = bounded(kind, allowed["low"], allowed["high"])
-        parser.add_argument(name, type=within, default=default, help=f"{text}, default {default}")
+        text += f", default {default}"
+        parser.add_argument(name, type=bounded(kind, allowed["low"], allowed["high"]), default=default, help=text)
 
 
 def run_study(given: argparse.Namespace) -> int:
@@ -115,9 +115,11 @@ def run_study(given: argparse.Namespace) -> int:
     study = _study(given)
     cases = {seed: chosen_cases(study, seed, given.cases, given.only or ()) for seed in given.seeds}
     every = [case for own in cases.values() for case in own]
+    if not every:
+        raise ValueError(f"no case has a number of --only; give 0 to {len(chosen_cases(study, given.seeds[0])) - 1}")
     if given.values:
         refuse_overridden(given, {name for case in every for name in study.own_values(case)}, "each case")
-    with batch_of(given, 1 if study.over_topics else max(len(every), 1)) as batch:
+    with batch_of(given, 1 if study.over_topics else len(every)) as batch:
         measured = evaluate(study, cases, *batch)
     if given.only:
         print(*measured.total, sep="\n")
@@ -125,8 +127,7 @@ def run_study(given: argparse.Namespace) -> int:
         print(report(measured, _words(given, study)))
     if given.write:
         _write(given, measured)
-    missed = measured.scores.missed
-    if missed:
+    if missed := measured.scores.missed:
         print(f"missed: {'; '.join(missed)}", file=sys.stderr)
     return 1 if missed else 0
 

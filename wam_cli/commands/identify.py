@@ -57,10 +57,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     length = bounded(float, 10.0, 3600.0, "s")  # the choice of its moves takes minutes
     parser.add_argument("--seconds", type=length, help="with --excite: length of the motion in s, default 60")
     parser.add_argument("--seed", type=SEED, help="with --excite: seed of the moves, default 1")
-    parser.add_argument(
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument(
         "--only-write", action="store_true", help="with --excite: write the scenario and do not play it"
     )
-    parser.add_argument("--write", type=MODEL, metavar="YAML", help="write the model as a configuration")
+    either.add_argument("--write", type=MODEL, metavar="YAML", help="write the model as a configuration")
     parser.add_argument(
         "--force", action="store_true", help="with --write: write the model even if it contradicts the configured arm"
     )

@@ -115,7 +115,9 @@ def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
         if names.count(name) > 1:
             raise ValueError(f"--vary has {name} {names.count(name)} times; give all its values in one --vary")
         if name.partition(":")[0] in ("scenario", "recorder"):
-            raise ValueError(f"--vary {name}: runs of a sweep have no such node; give the scenario with --scenario")
+            raise ValueError(
+                f"--vary {name}: a sweep has no such node; leave it out, or give the scenario with --scenario"
+            )
 
 
 def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
