@@ -30,7 +30,8 @@ REASONS: Final = {
 }
 
 PINNED: Final = (
-    "give the contact position (contact_position in a scenario, the torque in force_command, or contact_source=pinned)"
+    "give the contact position (contact_position in a scenario, r x F as torque in force_command, or "
+    "contact_source=pinned)"
 )
 RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly"
 EXCESS: Final = "{quantity} is {value:b} {unit}, above its limit of {allowed:g} {unit}{where}"

@@ -179,7 +179,7 @@ class Plant:
         self._rest()
 
     def trouble(self) -> str:
-        """Why the arm's simulation cannot go on; '' if it can, and `recover` then comes back to the present angles."""
+        """Why the arm's simulation cannot go on; '' if it can: then the present angles are kept for `recover`."""
         counts = self._view.warnings.tolist()
         if any(counts):
             return " and ".join(text for text, count in zip(WARNINGS.values(), counts, strict=True) if count)
@@ -249,7 +249,7 @@ class Plant:
         self._is_set = False
 
     def set_pretension(self, shares: Sequence[float]) -> None:
-        """Set the pretension of each circuit now (6.5), one part of the configured one for all, or one each, (n,).
+        """Set the pretension of the circuits now (6.5), as a part of the configured one: one for all, or (n,).
 
         Raises
         ------

@@ -46,7 +46,7 @@ class Study(ABC, Generic[Case, Record]):
     seeds : by default.
     count : cases of a seed by default; None for all that there are.
     base : name of the configuration by default.
-    over_topics : whether a case runs nodes over topics: one case at a time, and every parameter has its effect.
+    over_topics : whether a case runs nodes over topics; then one case runs at a time, and --set takes any parameter.
     configuration : under test.
     """
 

@@ -44,8 +44,8 @@ class FrictionVerdict(NamedTuple):
     margin : largest gain that is linearly stable with every contact stiffness.
     stable_error : largest saturation that is accepted; infinite in domain I, 0 in domain III and where friction keeps
         up a cycle.
-    undecided_error : largest saturation for which no response was found that does not come to rest, though not all
-        were followed to their end; `stable_error` where every response was decided, else above it.
+    undecided_error : largest saturation that may be stable: with it no response was found unstable, but some were
+        not followed to their end; `stable_error` where all were.
     cycle : stiction limit cycle of small errors.
     saturated_cycle : peak to peak of the largest limit cycle of F_c found in domain I with the saturation of the loop,
         N or N m: near the margin of a delayed loop friction keeps up one above the saturation.
@@ -105,7 +105,7 @@ def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
 
 
 class StableErrors(NamedTuple):
-    """Largest saturations of F_error, 0 for none: all responses come to rest, or none was found that does not."""
+    """Largest saturations of F_error with which all responses come to rest, or none was found unstable; 0 for none."""
 
     stable: float
     undecided: float

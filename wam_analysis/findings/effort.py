@@ -135,8 +135,8 @@ def _lost_way(piece: Piece, unit: str) -> str:
         return ""
     worst = int(np.argmax(excess))
     return (
-        f"within {SHAFT.way:g} s from {time[worst]:.4g} s on the position moved by {shown(moved[worst], unit)}, but by "
-        f"the recorded velocity by {shown(by[worst], unit)}; an encoder slips or stops, or one of the two is of "
+        f"in the {SHAFT.way:g} s from {time[worst]:.4g} s, the position changes by {shown(moved[worst], unit)}, the "
+        f"integral of the velocity by {shown(by[worst], unit)}; an encoder slips or stops, or one of the two is of "
         "something else"
     )
 

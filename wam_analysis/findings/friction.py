@@ -39,9 +39,7 @@ def friction_section(recording: AnalysedRecording) -> Section:
     if unsure:
         sentences.append(f"This recording does not determine {', '.join(unsure)}: {MORE}.")
     if still := [name for name, one in every.items() if math.isnan(one.dynamic.value)]:
-        sentences.append(
-            f"No friction found for {', '.join(still)}: too little motion, or not all of the torque is friction."
-        )
+        sentences.append(f"No friction found for {', '.join(still)}: too little motion, or other torques act, too.")
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)
     stated = (*[unknown][: bool(unknown)], *signals.caveats, *sentences, *flagged)

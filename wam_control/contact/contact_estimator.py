@@ -54,7 +54,7 @@ class ContactEstimate(NamedTuple):
     ----------
     external_torques : (n,), torques of the world on the joints, N m.
     torque_sd : (n,), their standard deviations, N m.
-    statistic : r^T S^-1 r of the external torques; that of a second, faster estimate of them where that counts more.
+    statistic : r^T S^-1 r of the external torques, or, scaled, of a faster estimate of them where that is larger.
     hypotheses : every explanation, the most probable first, empty without contact.
     reasons : why the position is NaN, the estimate not reliable, or why there is none.
     warning : `Code.MODEL_OFF` with the part of the model that is off; None for none.
@@ -126,7 +126,7 @@ class ContactEstimator:
     def zero(self) -> str:
         """Take the present torques of joint sensors as those of an arm at rest that nothing touches; '' or why not.
 
-        What was taken for a contact is forgotten: its moments have errors that are no longer those of the present one.
+        The earlier torques of a contact are forgotten: they were measured with another zero.
         """
         reason = self._observer.zero()
         if not reason:
@@ -176,8 +176,8 @@ class ContactEstimator:
 
         Parameters
         ----------
-        is_pressing : whether a force is commanded.  A contact then lasts until the arm leaves it, also one that is too
-            small to be detected: learned as an error of the model, it would be pressed ever harder.
+        is_pressing : whether a force is commanded.  A contact then counts until the arm leaves it, also while it is
+            not detected: if it was learned as an error of the model, the arm would press ever harder.
         """
         observer, parameters = self._observer, self._parameters
         torques, covariance = observer.torques()

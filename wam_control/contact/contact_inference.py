@@ -135,10 +135,10 @@ class ContactInference:
         ----------
         q : (n,), joint angles, rad.
         torques : (n,), external torques, N m.
-        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); not below `smallest_sd`.
+        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2).
         load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
         now : the same torques with what is known of their errors, to add them to `fusion`; None for them alone.
-        late : by which fraction the force has changed that the torques do not show yet.
+        late : change of the force that the torques do not show yet, as a fraction of it.
 
         Returns
         -------

@@ -3,7 +3,7 @@
 The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.  In one pose e stays as it
-is, also with a dither.  So many samples there show x and P more of that pose, but of other poses no more than one
+is, also with a dither.  So many samples there determine x better for that pose; for other poses they count as one
 sample of R.  What holds in that pose alone is forgotten where the arm is away from there without contact.
 
 How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, S is so much

@@ -49,8 +49,8 @@ class ShaftFriction:
     f = k (F s + b v).  The fraction s follows a motion dx as s' = sgn(dx) + (s - sgn(dx)) exp(-|dx| / d) (Dahl 1968):
     after a reversal, and after a stop, friction builds up over a presliding distance d.  How long that is nobody knows:
     s is computed for several distances, which are equally likely.  At rest s is forgotten.  k is the friction scale.
-    F = F_d + (F_s - F_d) exp(-(v / v_s)^2) of an identified arm; of others F_d, as friction that rises at rest alone is
-    as usual, and the difference is uncertain up to some v_s.
+    F = F_d + (F_s - F_d) exp(-(v / v_s)^2) of an identified arm.  Of others F = F_d, since the static friction may act
+    at rest alone; up to some v_s, F is uncertain by the difference.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class ShaftFriction:
     def of(self, velocity: Array, keep: float, dt: float) -> ShaftMotion:
         """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
 
-        `keep` is the decay of the memory of a shaft at rest in it, 0 for none: with a dither.
+        `keep` is the part of s that a shaft at rest keeps in this period; 0 with a dither.
         """
         speed, each = np.abs(velocity), self._each
         moving = np.minimum(1.0, speed / self._rest)

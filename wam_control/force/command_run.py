@@ -123,7 +123,7 @@ class Shaking:
 
 
 def harmonics(values: Array, turn: float) -> list[Phasors]:
-    """Complex amplitudes (n,) of values (m, n) that also drift, of each harmonic that one row in each period shows.
+    """Complex amplitudes (n,) of drifting values (m, n), of each harmonic below half the sampling frequency.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class CommandRun:
     timing : of the loops.
     q : joint angles (n,), rad.
     resting : torques of the world on the joints (n,), N m, of the arm at rest as it begins, not taken as zero.
-    still_sd : standard deviations of the torques of the world (n,), N m, then; later, as the arm last held.
+    still_sd : standard deviations of the torques of the world (n,), N m, as it begins, or as the arm last held.
     is_moving : whether the arm moves too fast for these to be known.
 
     Attributes

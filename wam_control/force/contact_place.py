@@ -41,7 +41,7 @@ class ContactPlace:
 
     A pinned point is one of the world: the link slides along it.  An estimate near its limits would step the measured
     force back and forth, so the last one that was certain is kept.  A position that is not known may be anywhere on
-    the cover: the force is then sensed apart from what depends on it.
+    the cover: its deviation is that of `anywhere_sd`.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class ForceMeasurement:
         joints : joint state from the motors.
         sensors : joint-side sensors, None where there are none.
         estimated, estimated_sd : estimated torques of the world on the joints (n,), N m, and their standard deviation.
-        is_touched : whether a contact is known; without one, what the motors show is none.
+        is_touched : whether a contact is known; without one, estimated torques count as zero.
         dt : outer period, s.
         """
         torque = self._torque(own, sensors, estimated)

@@ -107,7 +107,7 @@ class Oscillation:
         Parameters
         ----------
         force, desired : measured and commanded, N or N m.
-        sd : by which the sensors disturb the measured force; a swing within `FORCE.certain` of it to each side is none.
+        sd : of the measured force, by the sensors; swings of less than `FORCE.certain` of it to each side do not count.
         own : parameters of the force loop.
         dt : s.
         """

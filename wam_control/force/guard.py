@@ -34,8 +34,8 @@ Triple = tuple[float, float, float]
 class Supervision:
     """A parameter set that the guard has admitted; each set has its own object.
 
-    With guard.mode `limit` the gains of a set that is not stable are lowered to stable ones, and the gain of the
-    posture where no force gain would be stable with it.
+    With guard.mode `limit` the gains of a set that is not stable are lowered to stable ones; so is
+    `posture_gain`, if no force gain is stable with it.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class Watch:
     ----------
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
-    needed : factor that is demanded; no larger one is tried, so that a `scale` of this size may be larger.
+    needed : demanded `scale`, and the largest one that is tried: the true limit may be above it.
     assessed : contacts of the last assessment, none before the first; another list after each.
     """
 

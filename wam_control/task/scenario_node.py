@@ -95,7 +95,7 @@ class ScenarioNode:
         return self._end(f"step '{self._step}': {message}" if self._step else message)
 
     def take_status(self, status: NodeStatus) -> Outputs:
-        """End the task with a fault of the driver: no step may come any more; notice who else enables the arm."""
+        """End the task at a fault of the driver, as no further period may come; notice that the arm is enabled."""
         if self.done or status.node != "driver":
             return {}
         self._was_enabled |= status.mode == ENABLED

@@ -19,7 +19,7 @@ class ArmBus:
     Parameters
     ----------
     line : to the bus.
-    arm : whose torque constants only define what an ampere is, and whose start is the home pose.
+    arm : its torque constants convert amperes to torques; its start is the home pose.
     period : s, between two calls of `exchange`.
 
     Attributes

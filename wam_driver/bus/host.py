@@ -51,7 +51,7 @@ class Host:
         return found
 
     def ask(self, node: int, name: str, attempts: int = BUS.attempts) -> int | None:
-        """A property of a node, of the position its counts; None where it does not answer."""
+        """A property of a node, the position P in counts; None where it does not answer."""
         number = self.number(node, name)
         answer = node, None if name == "P" else number
         for _ in range(attempts):

@@ -100,7 +100,7 @@ def line_of(shared: Shared, own: BusParameters, clock: Any) -> Line:
 def answer(line: Line, arm: SimulatedBus, timeout: float) -> None:
     """Let a simulated arm answer the next frame on a line, as `virtual` or `udp_multicast`, if one comes in time, s.
 
-    Time in which nothing comes from the host is no silence to it, since a computer may hold up the host.
+    If nothing comes, the arm does not fault for silence, since a busy computer may hold up the host.
     """
     begin = line.now()
     frame = next((frame for frame in incoming(line, timeout) if frame.sender == HOST), None)  # others: an echo

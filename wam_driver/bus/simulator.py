@@ -121,7 +121,7 @@ class SimulatedBus:
         self.time = until
 
     def let_pass(self, seconds: float, silent: float = BUS.silent) -> None:
-        """Time of the host has passed, s, in which there may have been frames; what is later is no silence."""
+        """Time of the host has passed, s; at most `silent` of it counts as time without frames."""
         if self._mode == SafetyMode.ACTIVE:
             self._requested += max(0.0, seconds - silent)
         self._passed = max(self._passed, self.time - BUS.silent) + seconds

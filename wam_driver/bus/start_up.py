@@ -35,7 +35,7 @@ class StartUp(Host):
     Parameters
     ----------
     line : to the bus.
-    arm : whose torque constants only define what an ampere is, and whose start is the home pose.
+    arm : as that of `ArmBus`.
 
     Attributes
     ----------
