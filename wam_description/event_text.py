@@ -152,7 +152,7 @@ SENTENCES: Final = {  # by cause
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one",
-    "stopped": "{nodes} has stopped or is very slow: no new {topics}; start it again, or 'wam up' if that started it; "
+    "stopped": "{nodes} has stopped or is very slow: no new {topics}; if it has stopped, start it, or 'wam up', again; "
     "if the computer is busy, end other programs",
     "long_step": "no new {topics}, because {step}; make the steps of that node faster",
     "ended": "{node} has ended; start it again, or 'wam up' if that started it",

@@ -141,7 +141,7 @@ class Lockstep:
     def _cause(self, missing: list[str]) -> str:
         """The node that is the reason, and what to do about it."""
         if silent := ", ".join(self._session.silent):
-            return f"{silent} has stopped or is very slow; start it again, or 'wam up' if that started it"
+            return f"{silent} has stopped or is very slow; if it has stopped, start it, or 'wam up', again"
         found = self._interface.unanswered(missing, self._session.awaited)
         unknown = sorted(found.keys() - self._session.awaited.keys() - {""})
         if unknown or not found:

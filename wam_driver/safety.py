@@ -75,7 +75,7 @@ class Safety:
     def estop(self) -> Answer:
         """Stop at once and latch a fault."""
         self.trip(fault("emergency_stop"))
-        return Answer(True, f"fault: emergency stop; {self.held}; call reset_fault, then enable")
+        return Answer(True, f"fault: {self.fault}; {self.held}; call reset_fault, then enable")
 
     def damage(self, event: Event) -> None:
         """Latch the first damage done under the brakes, after the fault that has put them on."""

@@ -246,7 +246,7 @@ def _bandwidth(m: Measures) -> list[Requisite]:
     lower = force_resonances(rotor, m.link_inertia, stiffness, m.joint_contact_stiffness, 1.0).lower
     share = lower / hard_contact_bandwidth(rotor, stiffness)
     worst = int(np.argmin(lower))
-    text, all_joints = f"open-loop force bandwidth, joint {worst + 1}", "the same with all joints driven by torque"
+    text, all_joints = f"open-loop force bandwidth, joint {worst + 1}", "the same, but no joint is held"
     return [
         _row("high bandwidth", f"{text} (4.4)", float(lower[worst]) / (2.0 * math.pi), "Hz", source="3.2.3"),
         _row("high bandwidth", all_joints, m.coupled_bandwidth, "Hz", source="3.2.3"),

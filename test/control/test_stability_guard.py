@@ -274,7 +274,7 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
     here = list(own.guard.posture)
-    assert loop.report.facts["margin here, assessed"].startswith("not assessed yet, as no force was commanded")
+    assert loop.report.facts["margin here, assessed"].startswith("at `worst case`, until")
     assert follow(loop, here) == 1.0
     assert loop.watch is not None
     assert loop.report.facts["margin here"].startswith(f"{loop.watch.scale:.4g}"), "also where the factor stays"

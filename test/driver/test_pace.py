@@ -150,8 +150,8 @@ def test_a_period_passes_when_the_state_is_answered_and_the_next_is_due() -> Non
 
 STOPPED = [
     (["gravity", "velocity_loop"], "check that velocity_loop runs"),
-    (["velocity_loop"], "gravity has stopped or is very slow; start it again, or 'wam up' if that started it"),
-    ([], "gravity, velocity_loop has stopped or is very slow; start it again, or 'wam up' if that started it"),
+    (["velocity_loop"], "gravity has stopped or is very slow; if it has stopped, start it, or 'wam up', again"),
+    ([], "gravity, velocity_loop has stopped or is very slow; if it has stopped, start it, or 'wam up', again"),
 ]
 
 

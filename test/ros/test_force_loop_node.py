@@ -77,7 +77,7 @@ def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(
     feeder = Feeder(ros, tmp_path)
     seen = feeder.heard.seen["status"]
     feeder.feed_until(
-        lambda: bool(seen) and {"verdict": "accepted", "peers": "connected"}.items() <= feeder.facts()[1].items()
+        lambda: bool(seen) and {"gains": "accepted", "peers": "connected"}.items() <= feeder.facts()[1].items()
     )
     reported, facts = feeder.facts()
     assert (reported.level, reported.message) == (DiagnosticStatus.OK, "stable, domain I")

@@ -56,7 +56,7 @@ def test_a_recording_is_read_and_analysed() -> None:
 
 
 def test_the_guard_reports_its_margin_and_the_arm_its_jacobian() -> None:
-    assert wam_stack.guard("wam").facts["verdict"] == "accepted"
+    assert wam_stack.guard("wam").facts["gains"] == "accepted"
     arm = wam_stack.arm()
     assert arm.point_jacobian(POSE, "outer_link", (0.3, 0.0, 0.0)).shape == (3, 4)
     assert arm.gravity_torque(POSE)[1] == pytest.approx(7.55, abs=0.01)

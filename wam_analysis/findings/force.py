@@ -260,5 +260,5 @@ def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
         yield Finding(f"{name}: gain margin (at most {GUARD.largest_scale:g} tried)", "", math.nan, guard.scale, note)
     if predicted is not None and (size := predicted.actuator_peak_to_peak) > 0.0:
-        label = f"{name}: cycle of the motors at the contact, peak to peak"
+        label = f"{name}: way of the motors in that cycle, at the contact, peak to peak"
         yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")

@@ -27,8 +27,8 @@ COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
 UNUSED = "unused column"  # in place of the type of a topic
 RENAMED = (
-    "position.JOINT, velocity.JOINT, effort.JOINT, force.x to torque.z; for a single joint, give --map position=COLUMN "
-    "instead"
+    f"position.JOINT, velocity.JOINT, effort.JOINT, force.x to torque.z, a command {COMMANDED}position.JOINT; for a "
+    "single joint, give --map position=COLUMN instead"
 )
 WRENCH = ("force", "torque")  # quantities along x, y and z
 

@@ -27,7 +27,7 @@ from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 from wam_description.transmission_map import TransmissionMap
 
-UNKNOWN: Final = "not assessed yet, as no force was commanded; the margin is that of `worst case`"
+UNKNOWN: Final = "at `worst case`, until a force is commanded"
 Triple = tuple[float, float, float]
 
 
@@ -246,7 +246,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
         "limit cycle [N]": f"{cycle.peak_to_peak:.4g}",
         "period of the limit cycle [s]": f"{cycle.period:.4g}",
         "deadband that removes the limit cycle [N]": f"{cycle.deadband:.4g}",
-        "verdict": assessment.reason or "accepted",
+        "gains": assessment.reason or "accepted",
     }
     return Report(message, bool(assessment.reason) or is_scaled, facts)
 
