@@ -245,13 +245,15 @@ def with_joints(arm: Arm, kept: slice, **others: Any) -> Arm:
 
     parts = {name: getattr(arm, name) for name in ("motors", "cables", "joints", "links")}
     matrix = np.reshape(arm.joint_from_motor, (4, 4))[kept, kept]
-    groups = {name: type(group)(**{k: part(v) for k, v in vars(group).items()}) for name, group in parts.items()}
+    groups = {
+        name: type(group)(**{k: part(v) for k, v in dataclasses.asdict(group).items()}) for name, group in parts.items()
+    }
     return dataclasses.replace(arm, **others, **groups, joint_from_motor=tuple(matrix.ravel().tolist()))
 
 
 def one_joint(arm: Arm) -> Arm:
     """A testbed: the first motor and joint, lying down, with the outer cover on its link."""
-    covers = {k: v[len(v) // 2 :] for k, v in vars(arm.covers).items()}
+    covers = {k: v[len(v) // 2 :] for k, v in dataclasses.asdict(arm.covers).items()}
     outer = type(arm.covers)(**{**covers, "links": ("link1",)})
     return with_joints(arm, slice(1), covers=outer)
 
