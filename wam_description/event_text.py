@@ -22,7 +22,7 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "no single contact explains the torques",
-    Reason.ALONG: "a force along this link, or along the link before it, would cause the same torques",
+    Reason.ALONG: "a force along this link, or along the link before it, explains the torques as well",
     Reason.PAYLOAD: "a payload that was picked up may also explain the torques; the probabilities of the links and of "
     "the payload add up to 1",
     Reason.TOO_EARLY: "too few samples so far",

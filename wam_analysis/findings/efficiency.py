@@ -44,7 +44,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
             sentences.append(f"While driving, the motors put {shown(forward.put, 'J')} into the transmission.")
         if is_measured and back.put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * back.ratio, note="backdriven"))
-            sentences.append(f"The links put {shown(back.put, 'J')} into it while they moved the motors.")
+            sentences.append(f"The links, by their weight or a push, put {shown(back.put, 'J')} into it.")
     findings += _backdrive(signals.arm, recording.friction)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")

@@ -133,7 +133,7 @@ def _press_sentence(one: HeldForce) -> str:
     if response is not None and math.isfinite(response.rise):
         if why := _impact(one):
             remarks.append(f"{why}, so rise time and overshoot are not evaluated")
-        remarks += ["it did not settle to 5 %"] * math.isinf(response.settling)
+        remarks += ["it did not stay within 5 % of the step"] * math.isinf(response.settling)
     remarks += ["the arm was pushed meanwhile"] * one.is_pushed
     return f"{'; '.join(remarks)}."
 

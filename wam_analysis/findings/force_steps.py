@@ -119,7 +119,7 @@ def step_section(recording: AnalysedRecording) -> Section:
     for step in steps:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
-        settled = ", which did not settle to 5 %" * math.isinf(response.settling)
+        settled = ", without staying within 5 % of it" * math.isinf(response.settling)
         settled += ", without a rise in the recording" * math.isnan(response.settling)
         sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
         findings += [

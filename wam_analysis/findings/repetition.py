@@ -102,7 +102,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
-    span = f"To find vibrations below {least}, record a longer part without a gap."
+    span = f"To find vibrations below {least}, record longer without a gap."
     ranges = ", ".join(f"{shown(size, unit)} ({label})" for unit, (size, label) in varied.items())
     none = f"No vibration was found above {least} that lasts throughout. Largest minus smallest value: {ranges}."
     silent = [] if findings else [none]
