@@ -20,7 +20,7 @@ class ShaftThresholds:
     window_samples: int = 6  # in that window
     disobeyed: float = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
     turning: float = 5.0  # % of the time at rest; a joint with less does not stick
-    passing: float = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
+    passing: float = 0.25  # of the speed of rest: samples of a rest that are slower show no passage through zero
     still: float = 0.01  # of the speed of rest: below it the shaft has not begun to move
     # friction
     # of the way in one direction: less in the other is a deflection, as by a push, and shows no friction

@@ -31,7 +31,7 @@ class ForceStep(NamedTuple):
         return abs(self.response.final - self.commanded)
 
 
-def along(measured: Source, command: Source) -> Source:
+def _along(measured: Source, command: Source) -> Source:
     """A command of a single axis, which a number may be, on the axis of the measured force that follows it most."""
     own, known = command.only(*FORCE), measured.only(*FORCE)
     if len(own.values) != 1 or not known.values:
@@ -101,7 +101,7 @@ def step_section(recording: AnalysedRecording) -> Section:
     sentences, findings, doubts, followed = [], [], [], set()
     for one in (one for one in states if not one.is_joint):
         if (command := recording.command_of(one)) is not None:
-            on_axis = along(one, command)
+            on_axis = _along(one, command)
             doubts += [
                 f"{command.topic} has no {axis}, but {axis} of {one.label} follows it most, and is evaluated."
                 for axis in on_axis.values.keys() - command.values.keys()

@@ -516,12 +516,8 @@ def rests(source: Source) -> bool:
     if not len(position):
         return False
     sd = resolution(position)
-    return is_still(position, sd) and bool(np.ptp(position) <= SHAFT.far * sd)
-
-
-def is_still(position: Numbers, sd: float, way: float = 0.0) -> bool:
-    """Whether a position is for most of the time in one place, but for its noise and a way."""
-    return bool(np.ptp(np.percentile(position, (5.0, 95.0))) <= SHAFT.noisy * sd + way)
+    most = np.ptp(np.percentile(position, (5.0, 95.0)))  # of the time in one place, but for its noise
+    return bool(most <= SHAFT.noisy * sd and np.ptp(position) <= SHAFT.far * sd)
 
 
 def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:

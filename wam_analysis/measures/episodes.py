@@ -55,15 +55,15 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             both = [_cycle(time[inner], signal[inner], least, period) for signal in (value, flat)]
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
             goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-            if better is not None and not goes_on:
-                found.append(Episode(float(time[first]), float(time[last - 1]), better))
-                free[first:last] = False
-            elif goes_on or _changes(time[inner], flat[inner], period):
+            if goes_on or (better is None and _changes(time[inner], flat[inner], period)):
                 transients.append(_Transient(first, last, period, _width(time, period)))
-                free[first:last] = False  # its last part is no limit cycle
-            elif cycle.cycles >= 4 * CYCLE.episode_cycles:  # a step disturbs it elsewhere
-                found.append(Episode(float(time[begin]), float(time[begin + length - 1]), cycle))
-                free[rows] = False
+            else:
+                if better is None:  # a step disturbs it elsewhere
+                    if cycle.cycles < 4 * CYCLE.episode_cycles:
+                        continue
+                    first, last = begin, begin + length
+                found.append(Episode(float(time[first]), float(time[last - 1]), better or cycle))
+            free[first:last] = False  # the last part of a transient is no limit cycle
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
 
