@@ -134,8 +134,9 @@ def _in_motion(
     """Dynamic, viscous, inertia, offset and factors of the load by least squares, errors, rms and share of the rest."""
     nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, (math.nan, math.nan))
     triangle = np.pad(np.concatenate([np.arange(1, half + 2), np.arange(half, 0, -1)]).astype(float), 2)
-    slope = np.gradient(triangle / triangle.sum())
     triangle /= triangle.sum()
+    slope = np.gradient(triangle)  # of the mean acceleration over two periods: that of all else is Simpson's
+    triangle = np.convolve(triangle, (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0), "same")
     if len(velocity) < len(triangle):
         return nothing
     reach = np.ones(len(triangle))
