@@ -182,9 +182,8 @@ def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half:
         if np.count_nonzero(keep) < SHAFT.fewest_samples:
             break
         used, solution, rest = fit()
-        middle = float(np.median(rest[keep]))
-        sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
-        keep = np.abs(rest - middle) <= max(SHAFT.jump * sd, 1e-12)
+        sd = 1.4826 * float(np.median(np.abs(rest[keep])))
+        keep = np.abs(rest) <= max(SHAFT.jump * sd, 1e-12)
     if _distinct(scaled[keep], width) != used:  # what was left out was all of one direction
         used, solution, rest = fit()
     a = scaled[keep][:, used]
