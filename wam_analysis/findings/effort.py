@@ -51,7 +51,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if math.isnan(found.inertia.value):
             alone.append(one.label)
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
-        if lag:
+        if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not sentences:
@@ -191,11 +191,11 @@ def friction(source: Source) -> tuple[Friction, float]:
     one_frequency = bool(weight) and own < SHAFT.apart
     found, shift = (fit(0), 0) if one_frequency else _best(fit, most)
     # where the effort is filtered, its step at a reversal is no delay; nor is one over a way before it slides
-    before = np.roll(velocity, SHAFT.filtered * (abs(shift) or math.ceil(SHAFT.longest_effort_lag / period)))
-    use = np.sign(velocity) == np.sign(before)
+    near = SHAFT.filtered * (abs(shift) or math.ceil(SHAFT.longest_effort_lag / period))
+    use = np.all([np.sign(velocity) == np.sign(np.roll(velocity, way)) for way in (near, -near)], axis=0)
     settled = fit(shift, use)
     if _is_known(settled) and (shift or settled.residual < SHAFT.much_better * found.residual):
-        found, shift = (settled, shift) if shift or one_frequency else _best(lambda lag: fit(lag, use), most)
+        found, shift = (settled, shift) if one_frequency else _best(lambda lag: fit(lag, use), most)
     doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
