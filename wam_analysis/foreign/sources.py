@@ -529,8 +529,8 @@ def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
     position : (n,).
     """
     period = float(time[1] - time[0])
-    slope = np.gradient(position, period)
-    speed, sd = float(np.percentile(np.abs(slope), 95.0)), resolution(position) / period
+    speed = float(np.percentile(np.abs(np.gradient(position, period)), 95.0))
+    sd = resolution(position) / period
     half = 1
     while (
         half * period < STREAM.widest / 2.0
@@ -538,11 +538,9 @@ def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
         and len(position) > 2 * half + 2
     ):
         half += 1
-    if half > 1:
-        k = np.arange(half, -half - 1, -1)
-        inner = np.convolve(position, k / (float(k @ k) * period), "valid")
-        slope = np.pad(inner, half, "edge")
-    return slope, _of_slope(sd, half)
+    k = np.arange(half, -half - 1, -1)
+    inner = np.convolve(position, k / (float(k @ k) * period), "valid")
+    return np.pad(inner, half, "edge"), _of_slope(sd, half)
 
 
 def velocity_fit(source: Source) -> tuple[float, Treated | None]:
