@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
             name += f" ({first.frame})" if first.frame and all(one.frame != first.frame for one in others) else ""
             name += f" of {', '.join(one.name for one in those)}" if first.is_joint else ""
         stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
-        is_table = np.array_equal(stamp, received)  # or messages without stamps
+        columns: Any = recording.bag.topics[topic]
+        is_table = np.array_equal(columns.stamp_ns, columns.log_time_ns)  # or messages without stamps
         yield name, stamp, None if is_table else received, math.nan
 
 

@@ -26,7 +26,7 @@ class Treatment(StrEnum):
 
     ROUNDED = "the stamps are rounded to {size}; reception times are used"
     # the times of reception are coarse, too
-    SPREAD = "{number} of {of} stamps repeat the one before; the messages are placed evenly between them"
+    SPREAD = "the stamps are rounded to {size}; the messages are placed evenly between them"
     TWICE = "{number} of {of} stamps came twice; the first message of each is used"
     RELAYED = "{number} of {of} messages repeat the one before at another interval, as by a relay; the others are used"
     WRAPPED = "the {quantity} jumps {times} by {size}; it is unwrapped"
@@ -216,20 +216,23 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
     again *= 2 * np.sum(changed) < np.sum(~same)  # they are no copies where nothing moves
     is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
-    if of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps[~same] if is_seldom else steps):
-        quantum = int(np.gcd.reduce(steps))
-        if quantum > STREAM.irregular * np.median(steps[~same]):
-            return _received(rows, stamps, received, quantum)
-    if is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]:
-        left_out = of - int(np.sum(kept))
-        return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
+    quantum = int(np.gcd.reduce(steps))
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
+    fine = STREAM.irregular * period
+    own = steps[~same] if is_seldom else steps
+    if of > SHAFT.fewest_samples and quantum > fine and np.std(waits) < STREAM.paced * np.std(own):
+        return _received(rows, stamps, received, quantum)
     placed = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])
     even = np.linspace(stamps[0], stamps[-1] + period, of, endpoint=False)
-    if np.max(np.abs(even - placed)) <= period:
+    if np.max(np.abs(even - placed)) <= quantum:
         placed = even  # the rate was constant
-    return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", number, of),))
+    is_whole = not number and np.max(steps, initial=0) < STREAM.changes * period
+    is_rounded = is_whole and np.max(np.abs(placed - stamps)) > fine
+    if not is_rounded and (is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]):
+        left_out = of - int(np.sum(kept))
+        return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
+    return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", number, of, quantum / 1e9),))
 
 
 def clocks_of(bag: Bag) -> dict[str, Clock]:
