@@ -225,7 +225,7 @@ class StreamThresholds:
     quickest: float = 2e-5  # s from message to message: nor are more messages
     usual: float = 0.01  # s from message to message, by which the unit of stamps is guessed
     latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
-    seconds: float = 1e17  # a time below this is in seconds or less, above it in ns since 1970
+    seconds: float = 1e18  # a time below this is in seconds or less, above it in ns since 1970
     absent: float = 1.5  # periods between two messages of a frame, from which one is absent
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock

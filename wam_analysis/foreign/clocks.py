@@ -52,7 +52,7 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
         took = 0.0 if received is None else float(np.ptp(received)) / 1e9
         whole = float(np.ptp(numbers))
         is_slower = step >= STREAM.slowest and whole > STREAM.faster * took
-        if is_slower or 0.0 < whole < STREAM.quickest * len(numbers) or np.max(numbers) > STREAM.latest:
+        if is_slower or 0.0 < whole < STREAM.quickest * len(numbers):
             likely = min(
                 ("ms", "us", "ns", "h", "day"),
                 key=lambda unit: abs(math.log(max(UNITS[unit][0] * step, 1e-9) / STREAM.usual)),
@@ -61,7 +61,10 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
                 f"{label} increases by {shown(step)} from message to message, so it is hardly in s; give --unit "
                 f"stamp={likely}, or another one of s, ms, us, ns, h, day or a factor"
             )
-    return np.asarray(np.rint(BILLION * given.scaled("stamp")[0] * numbers), np.int64)
+    seconds = given.scaled("stamp")[0] * numbers
+    if np.max(seconds) > STREAM.latest:
+        raise ValueError(f"{label} reaches {shown(np.max(seconds), 's')}; give --unit stamp=, or times since 1970")
+    return np.asarray(np.rint(BILLION * seconds), np.int64)
 
 
 def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Clock]:
