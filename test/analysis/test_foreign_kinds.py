@@ -553,6 +553,7 @@ TABLES = {
     "tabs": Written(delimiter="\t"),
     "bars": Written(delimiter="|"),
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
+    "rounded": Written(times=lambda time: math.floor(time / 0.003) * 0.003),
     "dates": Written(times=date),
     "dates of a zone": Written(times=lambda time: f"{date(time)}+02:00"),
     "dates of two zones": Written(times=lambda time: f"{date(time)}Z" if time < 9 else f"{date(time - 3600)}-01:00"),
@@ -597,6 +598,7 @@ def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: P
     assert ("is computed from the position: a." in told) is not any("velocity" in one for one in titles)
     assert ("Not used" in analysis.sections[0].sentences[0]) is ("speed" in titles)
     assert "joints: reception jitter" not in numbers
+    assert sum("Hz: amplitude" in name for name in numbers) == 1
     assert analysis.recording.duration == pytest.approx(29.99, abs=0.02)
 
 
