@@ -5,6 +5,7 @@ page here with one link, which the site replaces by their text.
 """
 
 import builtins
+import gc
 import re
 import sys
 from functools import partial
@@ -59,6 +60,7 @@ apidoc_modules = [
 autodoc_default_options = {"members": True, "show-inheritance": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
+autodoc_use_type_comments = False  # there are none; looking for them reads each source again
 # the sidebar of every page copies the contents of all pages: with objects in them that took a third of the build
 toc_object_entries = False
 # a mock has no `|`, so what is installed is imported
@@ -74,10 +76,9 @@ def text_of(app: Sphinx, docname: str, source: list[str]) -> None:
     """The text of a page that is elsewhere, and links as the site needs them."""
     outside = OUTSIDE.get(docname)
     page = ROOT / outside if outside else HERE / f"{docname}.md"
-    if not page.is_file():
-        return
-    text = page.read_text(encoding="utf-8") if outside else source[0]
-    source[0] = LINK.sub(lambda found: f"]({target(page.parent, found['path'])}{found['anchor'] or ''})", text)
+    if page.is_file():
+        text = page.read_text(encoding="utf-8") if outside else source[0]
+        source[0] = LINK.sub(lambda found: f"]({target(page.parent, found['path'])}{found['anchor'] or ''})", text)
 
 
 def target(folder: Path, path: str) -> str:
@@ -103,16 +104,19 @@ def plain_docstring(app: Sphinx, what: str, name: str, obj: Any, options: Any, l
         lines[i] = "``".join(parts)
 
 
-def without_builtins(app: Sphinx, doctree: nodes.document) -> None:
-    """Do not link a builtin type to a field of ours that has its name, as `type` or `bytes`."""
+def without_others(app: Sphinx, doctree: nodes.document) -> None:
+    """Do not link a builtin type, as `bytes`, to a field of ours with its name; nor search ours for types of others."""
     for reference in list(doctree.findall(addnodes.pending_xref)):
-        if reference.get("refdomain") == "py" and hasattr(builtins, reference["reftarget"]):
+        package, dot, _ = reference["reftarget"].partition(".")
+        is_others = package in sys.modules and package not in PACKAGES if dot else hasattr(builtins, package)
+        if reference.get("refdomain") == "py" and is_others:
             reference.replace_self(reference.children)
 
 
 def setup(app: Sphinx) -> None:
     """Connect the above."""
+    gc.set_threshold(100_000)  # the trees of all pages stay: looking through them for garbage takes long
     app.add_source_parser(NotebookParser)
     app.connect("source-read", text_of)
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)
-    app.connect("doctree-read", without_builtins)
+    app.connect("doctree-read", without_others)

@@ -417,10 +417,7 @@ def draw_motor_space() -> None:
 def run_examples() -> None:
     """Run the notebooks and the sweep."""
     notebooks = sorted(str(path) for path in (ROOT / "docs" / "notebooks").glob("*.ipynb"))
-    for command in (
-        ["docs/notebook.py", *notebooks],
-        ["examples/sweep.py", "--picture", "docs/sweep.png"],
-    ):
+    for command in (["docs/notebook.py", *notebooks], ["examples/sweep.py", "--picture", "docs/sweep.png"]):
         subprocess.run([sys.executable, *command], cwd=ROOT, check=True)
 
 
