@@ -1,5 +1,6 @@
 """What all tests share; the fixture `arm` is that of the test kit."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -45,6 +46,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         is_grouped = name in ON_SOCKETS or is_shared or item.get_closest_marker("ros")
         if is_grouped and config.pluginmanager.hasplugin("xdist"):
             item.add_marker(pytest.mark.xdist_group("bus" if name in ON_SOCKETS else name))
+    gc.freeze()  # no search for garbage looks again through what the modules of all tests have made
 
 
 def _shares_a_fixture(item: pytest.Function) -> bool:

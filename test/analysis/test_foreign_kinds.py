@@ -4,6 +4,7 @@ import csv
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -59,6 +60,7 @@ def motion(rate: float, frequency: float, size: float, seconds: float = 30.0) ->
     return time, size * np.sin(w * time), velocity, DRY * np.sign(velocity) + VISCOUS * velocity + noise
 
 
+@cache
 def one(
     topic: str, rate: float, frequency: float, size: float, change: Any = None, seconds: float = 30.0
 ) -> list[Sent]:

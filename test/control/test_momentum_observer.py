@@ -143,13 +143,10 @@ def test_torques_that_come_late_are_no_external_ones() -> None:
 
 @pytest.mark.slow
 def test_rotor_inertia_is_part_of_the_momentum() -> None:
+    """Without it there are torques in the motion that alone gives none, see above."""
     without = dataclasses.replace(WAM, motors=dataclasses.replace(WAM.motors, inertia=(1e-9,) * 4))
-    worst = {}
-    for name, arm in (("with", WAM), ("without", without)):
-        rows = swing(MomentumObserver(arm, FREE, False), RigidArm(WAM, POSE, friction=0.0), 1.0)
-        worst[name] = np.abs(rows).max()
-    assert worst["with"] < 0.05
-    assert worst["without"] > 0.3
+    rows = swing(MomentumObserver(without, FREE, False), RigidArm(WAM, POSE, friction=0.0), 1.0)
+    assert np.abs(rows).max() > 0.3
 
 
 @pytest.mark.slow
