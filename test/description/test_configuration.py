@@ -78,14 +78,8 @@ def test_sections_cannot_be_written(file: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "message"),
     [
-        (
-            "timing.mod",
-            r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'",
-        ),
-        (
-            "loop:gian",
-            r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; did you mean 'loop:gain'",
-        ),
+        ("timing.mod", r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'"),
+        ("loop:gian", r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; did you mean 'loop:gain'"),
         ("lop:gain", r"mine\.yaml: no section '/\*\*/lop' for node 'lop'; sections: .*loop"),
     ],
 )
@@ -113,14 +107,8 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("steps: []", r"is a scenario, no configuration; play it with 'wam up --scenario /.*/odd\.yaml'"),
         ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
         ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
-        (
-            "driver: {ros__parameters: {}}\n/**: {ros__parameters: {}}",
-            r"section 'driver' is not allowed; write",
-        ),
-        (
-            "/**/a/b: {ros__parameters: {}}\n/**: {ros__parameters: {}}",
-            r"section '/\*\*/a/b' is not allowed; write",
-        ),
+        ("driver: {ros__parameters: {}}\n/**: {ros__parameters: {}}", r"section 'driver' is not allowed; write"),
+        ("/**/a/b: {ros__parameters: {}}\n/**: {ros__parameters: {}}", r"section '/\*\*/a/b' is not allowed; write"),
     ],
 )
 def test_file_that_is_no_configuration_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:

@@ -13,6 +13,9 @@ import mujoco
 import numpy as np
 import pytest
 
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+from simulation import installed
+
 from wam_description.configuration import Configuration, packaged
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
@@ -175,6 +178,9 @@ runpy.run_path("setup.py", run_name="__main__")
 def test_the_package_is_compiled_where_that_is_possible(
     wanted: str, is_there: bool, count: int | None, tmp_path: Path
 ) -> None:
+    if count is None and (site := installed()):  # what is installed was compiled so
+        assert len([*site.glob("wam_*/**/*.so")]) > 1
+        return
     for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml"):
         shutil.copy(SOURCE.parents[1] / name, tmp_path)
     for path in [SOURCE.parents[1] / "scripts", *SOURCE.parents[1].glob("wam_*")]:
