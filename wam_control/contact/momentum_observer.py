@@ -6,7 +6,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 import math
 from collections.abc import Sequence
 from operator import sub
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,9 +193,9 @@ class MomentumObserver:
             return False
         if friction:
             qdd = [change / span for change in map(sub, qd, before)]
-            self._filters.take(np.concatenate(([*present, *qd, *qdd], signals)), span)
+            self._filters.take([*present, *qd, *qdd, *signals.tolist()], span)
         else:
-            self._filters.take(np.array(present), span)
+            self._filters.take(present, span)
         self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias, links), 0.0
         self.age += span
         return True
@@ -276,7 +276,13 @@ def _unexplained(
     return [(now - then) / span - 0.5 * (one + other) for now, then, one, other in each]
 
 
-class _Sample(NamedTuple):
+def _low_pass(before: list[float], present: list[float], keep: float) -> list[float]:
+    """Filtered values of which the share `keep` stays: in a list, they take half the time of an array."""
+    take = 1.0 - keep
+    return [keep * old + take * new for old, new in zip(before, present)]  # noqa: B905 - as above
+
+
+class _Sample:
     """The last sample that was taken.
 
     Attributes
@@ -289,13 +295,18 @@ class _Sample(NamedTuple):
     links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
-    q: list[float]
-    qd: list[float]
-    momentum: list[float]
-    inertia: Array
-    known: list[float]
-    bias: list[float]
-    links: LinkMotion | None
+    def __init__(
+        self,
+        q: list[float],
+        qd: list[float],
+        momentum: list[float],
+        inertia: Array,
+        known: list[float],
+        bias: list[float],
+        links: LinkMotion | None,
+    ) -> None:
+        self.q, self.qd, self.momentum, self.inertia = q, qd, momentum, inertia
+        self.known, self.bias, self.links = known, bias, links
 
 
 class _Filters:
@@ -318,35 +329,28 @@ class _Filters:
     def __init__(self, n: int, size: int, times: Sequence[float], cycle: int) -> None:
         self.times, self.cycle, self._n = times, cycle, n
         self._ring = np.zeros((cycle, size))
-        self._span = math.inf
-        # one for each number: numpy multiplies by a single one more slowly
-        self._keeps = self._takes = self._empty = np.zeros((len(times), size))
+        self._empty = [[0.0] * size for _ in times]
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
         self._values, self.count = self._empty, 0
 
-    def take(self, present: Array, span: float) -> None:
+    def take(self, present: list[float], span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
         before, n = self._values, self._n
-        if not self.count:
-            self._values = present + self._empty
-        else:
-            if span != self._span:
-                keep = [[math.exp(-span / time)] for time in self.times]
-                self._span, self._keeps = span, np.repeat(keep, len(present), axis=1)
-                self._takes = 1.0 - self._keeps
-            self._values = self._keeps * before + self._takes * present[None]
-            if span > self.times[0]:  # continue from here
-                self._values[:, : 5 * n] = before[:, : 5 * n]
+        keeps = [math.exp(-span / time) if self.count else 0.0 for time in self.times]
+        self._values = [_low_pass(old, present, keep) for old, keep in zip(before, keeps, strict=True)]
+        if self.count and span > self.times[0]:  # continue from here
+            for new, old in zip(self._values, before, strict=True):
+                new[: 5 * n] = old[: 5 * n]
         if self.cycle:
             self._ring[self.count % self.cycle] = self._values[0]
         self.count += 1
 
     def motion(self, which: int) -> FilteredMotion:
         """What was filtered with one time constant; the torque of the model without the mean over a cycle."""
-        n, filtered = self._n, self._values[which]
+        n, filtered = self._n, np.array(self._values[which])
         mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
         pose, velocity, acceleration = mean[2 * n : 3 * n], mean[3 * n : 4 * n], mean[4 * n : 5 * n]
         return FilteredMotion(mean[:n], filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])
