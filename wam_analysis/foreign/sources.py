@@ -435,8 +435,7 @@ def _jumps(shown: Source) -> Numbers:
     usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
     least = max(STREAM.beyond * np.max(np.abs(moved)), usual, SHAFT.joint_rest)
     jumps = (np.abs(rest) > least) & ~after_gaps(shown.time)[1:]
-    if np.sum(jumps) <= STREAM.repeated * len(steps):
-        result[1:][jumps] = rest[jumps]
+    result[1:][jumps] = rest[jumps]
     return result
 
 
