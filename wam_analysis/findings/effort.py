@@ -159,10 +159,7 @@ def friction(source: Source) -> tuple[Friction, float]:
     of the effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the
     inertia is NaN; so are viscous friction and lag, and no lag is looked for.
     """
-    needed = [q for q in JOINT_FIELDS if q in source.values]
-    if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
-        source, needed = loaded, ["velocity", "effort"]
-    some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
+    some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
     if not some:
         return Friction(), 0.0
     period = some[0].period
@@ -191,7 +188,7 @@ def friction(source: Source) -> tuple[Friction, float]:
     one_frequency = bool(weight) and own < SHAFT.apart
     found, shift = (fit(0), 0) if one_frequency else _best(fit, most)
     # where the effort is filtered, its step at a reversal is no delay; nor is one over a way before it slides
-    near = SHAFT.filtered * (abs(shift) or math.ceil(SHAFT.longest_effort_lag / period))
+    near = math.ceil(SHAFT.filtered * SHAFT.longest_effort_lag / period)
     use = np.all([np.sign(velocity) == np.sign(np.roll(velocity, way)) for way in (near, -near)], axis=0)
     settled = fit(shift, use)
     if _is_known(settled) and (shift or settled.residual < SHAFT.much_better * found.residual):
