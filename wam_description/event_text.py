@@ -18,7 +18,7 @@ REASONS: Final = {
     "separated",
     Reason.SHOULDER: "in this pose, one moment at the shoulder is not measured",
     Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
-    Reason.ELBOW: "torque of the elbow near 0: contacts near the elbow and on the inner link cannot be distinguished",
+    Reason.ELBOW: "torque of the elbow near 0: contacts near it and on the link before it cannot be distinguished",
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "no single contact explains the torques",

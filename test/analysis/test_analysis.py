@@ -507,7 +507,7 @@ def test_the_samples_made_to_cycle_are_said_to_cycle_and_no_other_is(samples: di
 @pytest.mark.slow
 def test_the_motor_cycle_of_the_sample_has_the_size_of_5_20(samples: dict[str, Analysis]) -> None:
     findings = [one for section in samples["actuator-limit-cycle"].sections for one in section.findings]
-    (found,) = [one for one in findings if "way of the motors in that cycle" in one.name]
+    (found,) = [one for one in findings if "cycle of the motors" in one.name]
     assert found.measured == pytest.approx(found.predicted, rel=0.02)
 
 

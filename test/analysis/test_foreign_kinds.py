@@ -253,7 +253,7 @@ def called_as_commands() -> list[Case]:
 def few_cycles() -> list[Case]:
     return [
         Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
-             ("No vibration was found above", "value: 0.8 rad (", f"recording: {seconds:g} s"))
+             ("No vibration was found above", f"recording: {seconds:g} s"))
         for write, rate, frequency, seconds in (
             (by_rosbags, 250.0, 0.4, 10.0), (sqlite, 100.0, 0.1, 30.0), (ros1, 50.0, 0.03, 100.0),
         )
@@ -646,14 +646,15 @@ def test_a_table_that_cannot_be_read_as_it_is_meant_is_refused(
 def test_a_command_without_an_axis_is_that_of_the_axis_that_follows_and_spikes_hide_no_cycle() -> None:
     time = np.arange(0.0, 20.0, 0.004)
     asked = 8.0 * (time >= 5.0)
-    force = asked + np.sin(6.0 * math.pi * time) + np.where(np.arange(len(time)) % 1700 == 800, 300.0, 0.0)
+    force = asked + np.sin(6.0 * math.pi * time) + np.where(np.arange(len(time)) % 1700 == 800, 3e4, 0.0)
     table = {"time": time, "force.x": 0.1 * np.sin(time), "force.z": force, "command.force.x": asked}
     sections = analyse(table, lambda doing: None, NOTHING).sections
     numbers = {one.name: one.measured for section in sections for one in section.findings}
     assert numbers["wrench, 8 N at 5.0 s: force in the steady state"] == pytest.approx(8.0, abs=0.01)
     assert numbers["wrench force.z: cycle, peak to peak"] == pytest.approx(2.0, rel=0.02)
     told = " ".join(sentence for section in sections for sentence in section.wrong)
-    assert re.search("force.z jumps away and back 3 times, by up to 300 N.* but force.z of wrench follows it", told)
+    assert re.search("force.z jumps away and back 3 times, by up to 3.00e.04 N.*but force.z of wrench follows it", told)
+    assert not any("more than most robots" in sentence for section in sections for sentence in section.sentences)
 
 
 @pytest.mark.parametrize(("joints", "name"), [([], "q[2]"), (["elbow"], "elbow")])

@@ -85,7 +85,6 @@ class Played:
         self.set(self.true, 5.0, 5.5, "outer_link", (0.0, 20.0, 0.0), 0.25)  # has died out in the steady state
         self.statuses = [(name, START + round(1e9 * at), 0) for name, at in STEPS.items()]
         self.statuses.append(("done", START + 10_000 * MS, 0))
-        self.timing: list[dict[str, str]] = []
         self.recording: dict[str, str] = {}
         self.namespace = "/wam"
         self.without: tuple[str, ...] = ()
@@ -110,9 +109,6 @@ class Played:
             "status": messages([status("driver", "braked"), *itertools.starmap(said, self.statuses)]),
         }
         kept = {f"{self.namespace}/{name}": columns for name, columns in topics.items() if name not in self.without}
-        kept["/diagnostics"] = messages(
-            [array(START, status("wam: driver", "enabled", **facts)) for facts in self.timing]
-        )
         types = {f"{self.namespace}/{name}": BY_NAME[name].type for name in topics}
         attachments = {"parameters.yaml": PARAMETERS.encode()}
         return Bag(Path("bag"), kept, types, attachments, {"recording": self.recording})
@@ -190,11 +186,6 @@ def said(message: str, stamp: int, level: int) -> Any:
 def event(code: str, reason: str = "why") -> dict[str, str]:
     holds = {"event.1.holds": "1.0"} if code == "refused" else {}
     return {"event.1": code, "event.1.severity": "WARN", "event.1.reason": reason, **holds}
-
-
-def array(stamp: int, *statuses: Any) -> Any:
-    time = SimpleNamespace(sec=stamp // 10**9, nanosec=stamp % 10**9)
-    return SimpleNamespace(header=SimpleNamespace(stamp=time), status=statuses)
 
 
 def arm_of(bag: Bag) -> RecordedArm:
@@ -705,15 +696,6 @@ def test_empty_bag_gives_a_report():
     summary = AnalysedRecording(empty)
     assert not verdict(summary)
     assert "No commanded force was constant" in told(empty)
-
-
-def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
-    recording = Played()
-    recording.recording = {"mode": "lockstep"}
-    facts = [("0.000", "0.0", "0"), ("1.000", "4.0", "0"), ("0.500", "20.4", "7"), ("1.000", "1.0", "7")]
-    recording.timing = [{"real-time factor": f, "behind [ms]": b, "slips": n} for f, b, n in facts]
-    found = told(recording.bag())
-    assert "real-time factor 0.75; the computer was late 7 times, by at most 20 ms" in found
 
 
 def test_contact_lies_on_the_surface_of_its_cover_on_the_side_that_is_pushed():

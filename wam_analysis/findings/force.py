@@ -245,7 +245,7 @@ def _words(seen: Swings) -> str:
 
 def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
     name, cycle, seen, predicted = one.hold.name, one.cycle, one.swinging, theory.predicted
-    size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence)
+    size, time, sure = cycle.peak_to_peak, cycle.period, cycle.confidence
     if not sure >= CYCLE.sure:
         size = time = sure = math.nan
     force, period = (math.nan,) * 2 if predicted is None else (predicted.force_peak_to_peak, predicted.period)
@@ -260,5 +260,5 @@ def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
         yield Finding(f"{name}: gain margin (at most {GUARD.largest_scale:g} tried)", "", math.nan, guard.scale, note)
     if predicted is not None and (size := predicted.actuator_peak_to_peak) > 0.0:
-        label = f"{name}: way of the motors in that cycle, at the contact, peak to peak"
+        label = f"{name}: cycle of the motors due to Coulomb friction, at the contact, peak to peak"
         yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")

@@ -85,13 +85,11 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
 def spectrum_section(recording: AnalysedRecording) -> Section:
     """The strongest lines of each joint and wrench axis, in its longest stretch without a gap."""
     findings, begins = [], []
-    varied: dict[str, tuple[float, str]] = {}  # the largest range of each unit, and whose it is
     for one, quantity, label in traced(recording.states):
         if (piece := max(pieces(one, quantity), key=lambda part: len(part.time), default=None)) is None:
             continue
         begins.append(CYCLE.first_line / float(np.ptp(piece.time)))
         unit = one.units[quantity]
-        varied[unit] = max(varied.get(unit, (0.0, "")), (float(np.ptp(piece.values[quantity])), label))
         for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines):
             begins.append(line.frequency)
             amplitude = amplitude_at(piece.stamps, piece.recorded[quantity], line.frequency)
@@ -103,9 +101,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
     span = f"To find vibrations below {least}, record longer without a gap."
-    ranges = ", ".join(f"{shown(size, unit)} ({label})" for unit, (size, label) in varied.items())
-    none = f"No vibration was found above {least} that lasts throughout. Largest minus smallest value: {ranges}."
-    silent = [] if findings else [none]
+    silent = [] if findings else [f"No vibration was found above {least} that lasts throughout."]
     return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 

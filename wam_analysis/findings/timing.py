@@ -1,7 +1,7 @@
 """Section about the timing of the loop, and the provenance of the recording."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -15,7 +15,6 @@ from wam_analysis.recording import RATE, STAMPED, AnalysedRecording
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Times
 from wam_bag.losses import RECORDING
-from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
 
@@ -115,7 +114,7 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
     facts = {
         "bag": str(bag.path),
         **({} if recording.is_foreign else {"arm": recording.namespace or "/"}),
-        "mode": recording.mode + _pace(recording.loop),
+        "mode": recording.mode,
         "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
         "messages": _part_of(sum(counts.values()), sum(whole.values())),
         "lost": " ".join(recording.lost) or "none known",
@@ -125,19 +124,6 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
     }
     recorder = {key: value for key, value in metadata.items() if not key.startswith("/") and key != "mode"}
     return {**facts, **{f"recorded: {key}": value for key, value in recorder.items()}}
-
-
-def _pace(loop: Sequence[Mapping[str, str]]) -> str:
-    """How fast the time of the arm passed in paced lockstep, '' where that is not known."""
-    paced = [facts for facts in loop if REAL_TIME_FACTOR in facts][1:]  # the first is of no time
-    if not paced:
-        return ""
-    factors = np.array([float(facts[REAL_TIME_FACTOR]) for facts in paced])
-    factor = 1.0 / float(np.mean(1.0 / np.maximum(factors, 1e-3)))  # each is of a second of the arm
-    behind = max(float(facts.get(BEHIND, math.nan)) for facts in paced)
-    slips = paced[-1].get(SLIPS, "0")
-    slower = f"; the computer was late {slips} times, by at most {behind:.0f} ms" * (slips != "0")
-    return f"; real-time factor {factor:.2f}{slower}"
 
 
 def _part_of(read: int, all_of_them: int) -> str:

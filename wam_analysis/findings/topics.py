@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wam_analysis.findings.finding import Section, counted, shown, times
 from wam_analysis.foreign.sources import Source, Treated, clocks_of, pieces
@@ -60,10 +61,11 @@ def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Sou
     """Which values may be in another unit than that of ROS; a velocity that is the rate of a position is in none."""
     slow = [not is_motor(joint) for joint in columns.names] if isinstance(columns, JointColumns) else []
     for quantity, most in UNUSUAL.items():
-        values = np.abs(getattr(columns, quantity, np.empty(0)))
+        values = getattr(columns, quantity, np.empty(0))
         if slow and values.size and quantity in ("position", "velocity"):
             values = values[:, slow]
-        largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+        treated = [[part for name, part in one.values.items() if name.startswith(quantity)] for one in found]
+        largest = min(_largest(values), max(map(_largest, treated)) if treated and all(treated) else math.inf)
         is_rate = quantity == "velocity" and any(abs(one.velocity_factor - 1.0) <= SHAFT.agree for one in found)
         if largest > most and quantity not in given.units and not is_rate:
             taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, more than most robots"
@@ -75,13 +77,17 @@ def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Sou
             yield f"{name}: {taken}. If it was recorded in another unit, give {units}."
 
 
+def _largest(values: ArrayLike) -> float:
+    """Size of the largest value that is a finite number."""
+    return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+
+
 def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
     """Which joints would move faster than few do, where their velocity was not recorded."""
-    most = UNUSUAL["velocity"]
     for one in found:
         if _lacks_velocity(one) and "position" not in given.units and not is_motor(one.name):
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
-            if max(speeds, default=0.0) > most:
+            if max(speeds, default=0.0) > UNUSUAL["velocity"]:
                 fast = f"moves at up to {shown(float(max(speeds)), 'rad/s')}"
                 yield f"{one.label}: {fast}; if its position is in deg, give --unit position=deg."
 
