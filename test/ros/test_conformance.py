@@ -15,6 +15,7 @@ from ros_network import Network
 from sensor_msgs.msg import JointState
 
 from wam_cli.commands.conform import driver_alone, on_bus
+from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
 from wam_description.event import Event, Level
@@ -195,6 +196,16 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
     assert {row.verdict for row in rows[1:]} == {NOT_TESTED}
     assert rows[0].verdict == WRONG
     assert "motor_states" in rows[0].found
+
+
+def test_without_a_driver_that_runs_the_command_says_how_to_start_one(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], domain_id: int
+) -> None:
+    monkeypatch.setattr(DriverBench, "wait", lambda *_: False)
+    with pytest.raises(SystemExit):
+        main(["conform", "--running", "--config", "barrett-wam4-bus", "--namespace", "left"])
+    text = "no driver publishes /left/motor_states; start the driver alone: wam node driver --config barrett-wam4-bus"
+    assert text in capfd.readouterr().err
 
 
 class Broken:

@@ -321,15 +321,17 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     from wam_cli.main import main
 
     place = Place(domain_id, "/wam", "velocity_loop")
-    with pytest.raises(SystemExit) as ended:
-        main(["up"])
+    for command in (["conform", "--running"], ["up"]):
+        with pytest.raises(SystemExit) as ended:
+            main(command)
+        assert ended.value.code == 1
     place.close()
-    assert ended.value.code == 1
-    (line,) = capsys.readouterr().err.splitlines()
+    alone, line = capsys.readouterr().err.splitlines()
     assert (
         f"node 'velocity_loop' already runs in namespace /wam of ROS domain {domain_id} (process {os.getpid()})" in line
     )
     assert "stop it, or use another ROS_DOMAIN_ID" in line
+    assert "takes the place of velocity_loop; stop the stack, then start the driver alone: wam node driver" in alone
     require_places(["velocity_loop"], "wam")
 
 

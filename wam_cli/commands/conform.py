@@ -1,7 +1,7 @@
 """`wam conform`: a driver, tested against the contract of docs/driver.md."""
 
 import argparse
-import sys
+import shlex
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +18,7 @@ from wam_driver.thresholds import BUS
 from wam_ros.bring_up import NodeProcess
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, conformance_rows
 from wam_ros.driver_bench import DriverBench
-from wam_ros.network import require_places
+from wam_ros.network import occupant, requested_domain, require_places
 from wam_ros.priority import set_priority
 
 
@@ -50,7 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--running",
         action="store_true",
-        help="test a driver that already runs, started with timing.mode=realtime and nodes=[driver,velocity_loop]",
+        help="test a driver that already runs, without the stack; if none runs, this prints how to start it",
     )
     parser.add_argument(
         "--current",
@@ -91,19 +91,28 @@ def run(given: argparse.Namespace) -> int:
     configuration = driver_alone(on_bus(configuration, given.bus))
     if given.dry_run:
         return _listen(configuration, given.dry_run)
-    print(f"driver under test: {configuration.shared.nodes[0]}{', which already runs' if given.running else ''}")
-    require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
+    entry = configuration.shared.nodes[0]
+    values = *given.values, "timing.mode=realtime", f"nodes=[{entry},velocity_loop]"
+    words = ["--config", given.config, *(f"--set={value}" for value in values), "-r", f"__ns:=/{given.namespace}"]
+    cure = f"start the driver alone: wam node driver {shlex.join(words)}"
+    if not given.running:
+        require_places(["driver", "velocity_loop"], given.namespace)
+    elif occupant(requested_domain(), f"/{given.namespace}", "velocity_loop"):
+        raise ValueError(f"wam conform takes the place of velocity_loop; stop the stack, then {cure}")
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
     with (
         DriverBench(configuration.shared, given.share, given.current, given.namespace) as bench,
         served(configuration, given.arm),
     ):
+        if given.running and not bench.wait(lambda: bench.is_published("motor_states")):
+            raise ValueError(f"no driver publishes /{given.namespace}/motor_states; {cure}")
         timing = configuration.shared.timing
         set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
+        print(f"driver under test: {entry}")
         started: list[NodeProcess] = []
 
         def start() -> None:
-            started.append(NodeProcess(configuration, configuration.shared.nodes[:1], given.namespace))
+            started.append(NodeProcess(configuration, [entry], given.namespace))
 
         try:
             if not given.running:
@@ -111,8 +120,7 @@ def run(given: argparse.Namespace) -> int:
                 bench.end, bench.restart = started[-1].close, start
             for row in conformance_rows(bench, given.attempts):
                 counts[row.verdict] += 1
-                print(row.text)
-                sys.stdout.flush()
+                print(row.text, flush=True)
         finally:
             for driver in started:
                 driver.close()

@@ -23,30 +23,38 @@ def heard(line: Line, seconds: float) -> Iterator[str]:
 
 
 def sent(shared: Shared, own: BusParameters, version: int) -> Iterator[str]:
-    """What the driver sends to an arm with firmware of a version, from the first frame to the first cycle.
+    """What the driver sends to an arm with firmware of a version, from the first frame to the last.
 
     It is played against the simulated arm, whose zero is lost by an E-stop, with a person who obeys.
     """
     bus = SimulatedBus(shared, own, version)
     bus.switch(SafetyMode.ESTOP)
     arm = ArmBus(bus, shared.arm, shared.timing.period)
-    parts = defaultdict[str, list[Frame]](list)
+    parts, remark = defaultdict[str, list[Frame]](list), ""
 
     def overhear(frame: Frame) -> list[Frame]:
         if frame.sender == HOST:
-            parts["each period, torques only while the arm is enabled" if arm.is_running else arm.advice].append(frame)
+            parts[remark or arm.advice].append(frame)
         return [frame]
 
     bus.on_line = overhear
-    while not arm.is_running and not arm.trouble:
+    while arm.advice and not arm.trouble:
         arm.exchange()
         arm.confirm_home()
-    arm.exchange()
+    poll = round(BUS.poll / shared.timing.period)
+    remark = f"in every {poll} periods"
+    for _ in range(poll):
+        arm.exchange()
+    remark = "at enable"
     arm.brake(False)
+    remark = "in each period while the arm is enabled"
     arm.command(arm.state.effort)
+    remark = "at disable"
+    arm.brake(True)
+    remark = "at estop, at a fault of the bus, and at the end"
     arm.close()
-    for remark, found in parts.items():
-        yield f"-- {remark}"
+    for when, found in parts.items():
+        yield f"-- {when}"
         yield from _listed(found, version)
 
 
