@@ -326,6 +326,7 @@ def test_a_wrong_parameter_stops_the_process_with_its_name(
     assert "Traceback" not in done.stdout + done.stderr
 
 
-def test_a_parameter_on_the_command_line_wins_over_the_file(domain_id: int) -> None:
-    done = run_node("driver", "--ros-args", "--params-file", str(packaged("wam")), "-p", "watchdog:=0.5")
+@pytest.mark.parametrize("given", [["--params-file", str(packaged("wam"))], ["--config", "barrett-wam4-bus"]])
+def test_a_parameter_on_the_command_line_wins_over_the_file(given: list[str], domain_id: int) -> None:
+    done = run_node("driver", *given, "-p", "watchdog:=0.5")
     assert "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05" in done.stderr
