@@ -36,12 +36,13 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     power, spacing = amplitude**2, (n - 1) / (n * float(time[-1] - time[0]))
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
+    sure = math.log(n / 2) + CYCLE.sure_line
     found: list[SpectralLine] = []
     for k in peaks[np.argsort(-power[peaks])].tolist():
         is_clear = not found or (len(found) < most and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
         if k < CYCLE.first_line or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
             continue
-        if power[k] < (math.log(n / 2) + CYCLE.sure_line) * _noise(power, k):
+        if power[k] < sure * _nearest(power, k) or power[k] < sure * _noise(power, k):
             continue
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
@@ -66,13 +67,14 @@ def _windowed(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
     return flat * window, window
 
 
-def _noise(power: Numbers, k: int) -> float:
-    """Level of the noise at a bin: of a line through the logarithms of power and frequency of its neighbours.
+def _nearest(power: Numbers, k: int) -> float:
+    """Mean of the nearest bins: the level of the noise where it is higher than `_noise`, as next to a transient."""
+    return float(np.mean(np.concatenate((power[max(k - 4, 1) : k - 2], power[k + 3 : k + 5]))))
 
-    The mean of the nearest bins is taken if it is higher, as next to the hump of a transient.
-    """
+
+def _noise(power: Numbers, k: int) -> float:
+    """Level of the noise at a bin: of a line through the logarithms of power and frequency of its neighbours."""
     reach = min(max(k // 2, CYCLE.neighbours[0]), CYCLE.neighbours[1])
     rows = np.r_[max(k - reach, 1) : k - 2, k + 3 : min(k + reach + 1, len(power))]
     line = np.polynomial.polynomial.polyfit(np.log(rows / k), np.log(np.maximum(power[rows], 1e-300)), 1)
-    near = np.r_[max(k - 4, 1) : k - 2, k + 3 : min(k + 5, len(power))]
-    return max(math.exp(float(line[0]) + CYCLE.euler_gamma), float(np.mean(power[near])))
+    return math.exp(float(line[0]) + CYCLE.euler_gamma)
