@@ -6,7 +6,6 @@ import time
 from pathlib import Path
 
 from wam_analysis.findings.analysis import analyse, analyse_steps
-from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
 from wam_cli.options import HTML, JSON, exit_code_of, take_arm, take_topic_map, topic_map_of
 
@@ -59,6 +58,8 @@ def run(given: argparse.Namespace) -> int:
             given.json.write_text(json_text(analysis) + "\n", encoding="utf-8")
             progress(f"wrote {given.json}")
     if given.html:
+        from wam_analysis.findings.page import page  # it imports matplotlib
+
         progress("drawing")
         given.html.write_text(page(analysis), encoding="utf-8")
         progress(f"wrote {given.html}")

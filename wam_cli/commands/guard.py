@@ -7,7 +7,6 @@ from wam_cli.options import BASE_CONFIGURATION, PICTURE, configuration_of, take_
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
 from wam_stack import guard
-from wam_studies.figures.map_picture import draw
 from wam_theory.loop_design import loop_design
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
@@ -89,5 +88,7 @@ def _assess(given: argparse.Namespace) -> int:
     design = loop_design(FrictionNode(*(*plant, stiction)), loop, given.rate, given.delay)
     print(design.text())
     if given.picture:
+        from wam_studies.figures.map_picture import draw  # it imports matplotlib
+
         draw(design, given.picture)
     return int(not design.is_safe)
