@@ -103,7 +103,7 @@ class MomentumObserver:
         self._errors = ModelErrors(
             prior, parameters.drift, side.map.motor_from_joint.T, noise, parameters.motor_torque_sd**2
         )
-        self._filters = _Filters(n, (3 if use_joint_sensors else 14 + 2 * len(LOG_DISTANCES)) * n, times, cycle)
+        self._filters = _Filters(n, 0 if use_joint_sensors else (9 + 2 * len(LOG_DISTANCES)) * n, times, cycle)
         self.reset()
         self.seen = self._observation()
 
@@ -192,10 +192,8 @@ class MomentumObserver:
             self._gap += dt
             return False
         if friction:
-            qdd = [change / span for change in map(sub, qd, before)]
-            self._filters.take([*present, *qd, *qdd, *signals.tolist()], span)
-        else:
-            self._filters.take(present, span)
+            present += [*qd, *(change / span for change in map(sub, qd, before))]
+        self._filters.take(present, signals, span)
         self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias, links), 0.0
         self.age += span
         return True
@@ -312,12 +310,13 @@ class _Sample:
 class _Filters:
     """First-order filters of what a sample shows, and its mean over a cycle of a dither.
 
-    Each number is filtered with every time constant, in the order of `FilteredMotion`.
+    Each number is filtered with every time constant, in the order of `FilteredMotion`: torques and motion in lists,
+    the signals of the shafts, which are many, in arrays.
 
     Parameters
     ----------
     n : number of joints.
-    size : of a sample.
+    signals : number of signals.
     times : time constants, s.
     cycle : samples in a cycle of the dither, 0 where there is none.
 
@@ -326,31 +325,31 @@ class _Filters:
     count : number of samples.
     """
 
-    def __init__(self, n: int, size: int, times: Sequence[float], cycle: int) -> None:
+    def __init__(self, n: int, signals: int, times: Sequence[float], cycle: int) -> None:
         self.times, self.cycle, self._n = times, cycle, n
-        self._ring = np.zeros((cycle, size))
-        self._empty = [[0.0] * size for _ in times]
+        self._ring = np.zeros((cycle, 5 * n + signals))
+        self._empty = [[0.0] * (5 * n) for _ in times], np.zeros((len(times), signals))
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._values, self.count = self._empty, 0
+        (self._values, self._signals), self.count = self._empty, 0
 
-    def take(self, present: list[float], span: float) -> None:
+    def take(self, present: list[float], signals: Array, span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
-        before, n = self._values, self._n
         keeps = [math.exp(-span / time) if self.count else 0.0 for time in self.times]
-        self._values = [_low_pass(old, present, keep) for old, keep in zip(before, keeps, strict=True)]
-        if self.count and span > self.times[0]:  # continue from here
-            for new, old in zip(self._values, before, strict=True):
-                new[: 5 * n] = old[: 5 * n]
+        if not self.count or span <= self.times[0]:
+            self._values = [_low_pass(old, present, keep) for old, keep in zip(self._values, keeps, strict=True)]
+        if len(signals):
+            shares = np.array(keeps)[:, None]
+            self._signals = shares * self._signals + (1.0 - shares) * signals
         if self.cycle:
-            self._ring[self.count % self.cycle] = self._values[0]
+            self._ring[self.count % self.cycle] = np.concatenate((self._values[0], self._signals[0]))
         self.count += 1
 
     def motion(self, which: int) -> FilteredMotion:
         """What was filtered with one time constant; the torque of the model without the mean over a cycle."""
-        n, filtered = self._n, np.array(self._values[which])
+        n, filtered = self._n, np.concatenate((self._values[which], self._signals[which]))
         mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
         pose, velocity, acceleration = mean[2 * n : 3 * n], mean[3 * n : 4 * n], mean[4 * n : 5 * n]
         return FilteredMotion(mean[:n], filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])
