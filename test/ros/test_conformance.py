@@ -5,7 +5,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from functools import partial
+from functools import partial, partialmethod
 from pathlib import Path
 from typing import Any
 
@@ -201,7 +201,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
 def test_without_a_driver_that_runs_the_command_says_how_to_start_one(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], domain_id: int
 ) -> None:
-    monkeypatch.setattr(DriverBench, "wait", lambda *_: False)
+    monkeypatch.setattr(DriverBench, "wait", partialmethod(DriverBench.wait, seconds=0.1))
     with pytest.raises(SystemExit):
         main(["conform", "--running", "--config", "barrett-wam4-bus", "--namespace", "left"])
     text = "no driver publishes /left/motor_states; start the driver alone: wam node driver --config barrett-wam4-bus"
