@@ -247,7 +247,6 @@ class StreamThresholds:
     beyond: float = 2.0  # times the largest step by the velocity: a larger one does
     around: int = 2  # steps on each side that show the velocity where none was recorded
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
-    loud: float = 1e3  # roundings of a number: smaller changes are none
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
     averaged: float = 0.2  # s, over which a recorded velocity is compared with the rate of the position
     widest: float = 0.03  # s about each sample that such a velocity is taken from

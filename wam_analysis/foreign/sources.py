@@ -232,7 +232,7 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     if not is_rounded and (is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]):
         left_out = of - int(np.sum(kept))
         return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
-    return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", number, of, quantum / 1e9),))
+    return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", size=quantum / 1e9),))
 
 
 def clocks_of(bag: Bag) -> dict[str, Clock]:
@@ -290,7 +290,6 @@ def alternates(source: Source) -> bool:
         finest = max(
             float(np.median(twice)),
             float(np.min(twice, initial=math.inf, where=twice > 0.0)) if np.any(twice) else 0.0,
-            STREAM.loud * np.finfo(float).eps * float(np.max(np.abs(values))),
             CYCLE.still_shaft / STREAM.alternates if quantity == "position" else 0.0,
         )
         away = once > STREAM.alternates * np.maximum(np.maximum(*near), np.maximum(twice, finest))
@@ -316,7 +315,7 @@ def _received(rows: Index, stamps: Times, received: Times, quantum: int) -> _Tim
     order = np.argsort(arrived, kind="stable")
     times = arrived[order] - np.min(arrived - stamps)
     kept = np.concatenate([[True], np.diff(times) > 0])
-    treated = Treated(Treatment.ROUNDED, "", len(rows), len(rows), quantum / 1e9)
+    treated = Treated(Treatment.ROUNDED, "", size=quantum / 1e9)
     return _Timed(rows[order][kept], times[kept] / 1e9, (treated,))
 
 
