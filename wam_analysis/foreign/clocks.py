@@ -98,12 +98,13 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
     there = np.interp((received - begin).astype(float), (arrivals[order] - begin).astype(float), (age - age[0]) * 1.0)
     apart = received - clock.times - age[0] - np.rint(there).astype(np.int64)
     shift = round(float(np.median(apart - apart[0]))) + int(apart[0])
-    if abs(shift) <= STREAM.reset:
+    spread = float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05))
+    if max(abs(shift), spread) <= STREAM.reset:
         return clock
     side = "behind" if shift > 0 else "ahead of"
     of = "of another clock" if len(received) > 1 else "of another clock, or sent before the recording"
     note = clock.note or f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as {of}"
-    if float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05)) > STREAM.reset:
+    if spread > STREAM.reset:
         return Clock(clock.times + apart, clock.note or f"{note}; reception times are used")
     return Clock(clock.times + shift, clock.note or f"{note}; they are shifted by this")
 
