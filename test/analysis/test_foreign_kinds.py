@@ -437,15 +437,15 @@ def other_units() -> list[Case]:
     def scaled(quantity: str, by: float, write: Any, wrong: str, *units: str) -> Case:
         sent = one("/joint_states", 100.0, 0.7, 0.5)
         sent = [s._replace(fields=s.fields | {quantity: by * s.fields[quantity]}) for s in sent]
-        told = " or ".join(f"--unit {quantity}={unit})" for unit in units)
-        return Case(quantity, write, sent, {}, wrong, NOTHING, (f"If it was recorded in another unit, give {told}.",))
+        told = "If it was recorded in another unit, give " + " or ".join(f"--unit {quantity}={unit})" for unit in units)
+        return Case(quantity, write, sent, {}, wrong or told, NOTHING, (told,))
 
     degree = 180.0 / math.pi
     slow = one("/joint_states", 100.0, 0.7, 5.0)  # of 5 degrees
     alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
     two, in_degrees = "one of the two has another unit", "if its position is in deg, give --unit position=deg"
     return [
-        Case("position alone", by_rosbags, alone, {}, "", NOTHING, (in_degrees,)),
+        Case("position alone", by_rosbags, alone, {}, in_degrees, NOTHING, ()),
         scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),
         scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "mm/s (shown in m/s", "rpm (shown in rad/s"),
         scaled("effort", 1e3, by_rosbags, "", "mN (shown in N", "mNm (shown in N m", "mA (shown in A"),

@@ -48,11 +48,11 @@ def contact_section(recording: AnalysedRecording) -> Section:
         off = _middle(np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate])
         vector = "norm of the error vector; without forces that are lower bounds"
         findings += [
-            Finding("correct link, of all contact time", "%", right),
+            Finding("correct link, of true contact time", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
             Finding("norm of the force error, median", "N", off, note=vector),
         ]
-        shows.append(f"Contacts: correct link for {right:.3g} % of all contact time{_errors(away, off)}.")
+        shows.append(f"Contacts: correct link for {right:.3g} % of true contact time{_errors(away, off)}.")
     if np.any(known):
         note = "false contacts, and the ends of others"
         findings.append(Finding("contact estimated where none is", "s", traces.false_seconds, note=note))

@@ -115,7 +115,7 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
         "bag": str(bag.path),
         **({} if recording.is_foreign else {"arm": recording.namespace or "/"}),
         "mode": recording.mode,
-        "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
+        "topics": _part_of(sum(count > 0 for count in counts.values()), len(whole)),
         "messages": _part_of(sum(counts.values()), sum(whole.values())),
         "lost": " ".join(recording.lost) or "none known",
         "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",

@@ -24,7 +24,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
     clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
-    wrong, doubts = [*_treated(found), *clocks], list[str]()
+    wrong = [*_treated(found), *clocks]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
         f"took turns; the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
@@ -33,14 +33,14 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-        doubts += _too_large(name, columns, given, [one for one in found if one.topic == name])
-    doubts += _fast(found, given)
+        wrong += _too_large(name, columns, given, [one for one in found if one.topic == name])
+    wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
     if computed := [one.label for one in found if _lacks_velocity(one)]:
         sentences.append(f"The velocity is computed from the position: {', '.join(computed)}.")
-    sentences += [*wrong, *doubts, *_alike(found), *unread(bag)]
-    return Section("happened", "What happened", sentences, shows=doubts, wrong=wrong)
+    sentences += [*wrong, *_alike(found), *unread(bag)]
+    return Section("happened", "What happened", sentences, wrong=wrong)
 
 
 def _topic(name: str, columns: Columns) -> Iterator[str]:

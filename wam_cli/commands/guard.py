@@ -4,6 +4,7 @@ import argparse
 import math
 
 from wam_cli.options import BASE_CONFIGURATION, PICTURE, configuration_of, take_configuration
+from wam_control.task.scenario import FORCE_LOOP
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
 from wam_stack import guard
@@ -68,8 +69,9 @@ def _assess_configuration(configuration: Configuration) -> int:
     report = guard(configuration)
     facts = {name: value for name, value in report.facts.items() if name not in LEFT_OUT}
     width = max(map(len, facts))
-    if SERVO not in configuration.shared.nodes and "domain" in report.facts:
-        print(f"computed for the packaged {SERVO}; the guard does not know the one that this configuration runs")
+    absent = {SERVO, FORCE_LOOP}.difference(configuration.shared.nodes)
+    if absent and "domain" in report.facts:
+        print(f"computed for the packaged {' and '.join(sorted(absent))}, which this configuration does not run")
     print("\n".join([report.message, *(f"  {name:{width}}  {value}" for name, value in facts.items())]))
     return int(report.is_warning)
 

@@ -488,7 +488,8 @@ class ForceLoop:
         if holds:
             bounds.append((allowed, "the commanded force"))
         elif pressed and len(forces) == len(run.axes):
-            bounds.append((own.limits.whole_force * pressed, "limits.whole_force"))
+            factor = own.limits.whole_force
+            bounds.append((factor * pressed, f"{factor:g} times the command, limits.whole_force"))
         now = torques.now - run.resting
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._pose).dot(torques.acceleration)
