@@ -192,7 +192,8 @@ class CableCircuits:
     @property
     def torque(self) -> list[float]:
         """Torque of each circuit at its motor, elastic and damping, N m, (n,), at the start of the last step."""
-        each = zip(self._damping, self._stretch_rate.tolist(), self._pulls())  # noqa: B905 - costs 1 % of a period
+        rates: list[float] = self._stretch_rate.tolist()
+        each = zip(self._damping, rates, self._pulls())  # noqa: B905 - costs 1 % of a period
         return [damping * rate - pull for damping, rate, pull in each]
 
     def tensions(self, pulls: Sequence[float]) -> list[float]:

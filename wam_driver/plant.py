@@ -10,7 +10,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import partial
-from operator import index
+from operator import add, index
 from struct import Struct
 from typing import SupportsIndex
 
@@ -386,14 +386,14 @@ class Plant:
         The torque of cables and friction less what accelerates the pulleys.  A strain gauge at the
         root of the link reads it: M qdd + c(q, qd) + g - tau_ext of the links alone.
         """
-        n = self._n
-        acceleration, velocity, dry = self._view.qdd.tolist(), self._velocity[n:], self._friction_torque()[n:]
-        return [
-            torque - damping * speed - armature * qdd + friction
-            for torque, damping, speed, armature, qdd, friction in zip(  # noqa: B905 - as long as the work
-                self.cable_torque, self._view.damping, velocity, self._view.armature, acceleration, dry
+        acceleration: list[float] = self._view.qdd.tolist()
+        driven = [  # five lists at a time have types
+            torque - damping * speed - armature * qdd
+            for torque, damping, speed, armature, qdd in zip(  # noqa: B905 - as long as the work
+                self.cable_torque, self._view.damping, self._velocity[self._n :], self._view.armature, acceleration
             )
         ]
+        return list(map(add, driven, self._friction_torque()[self._n :]))
 
     def loads(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
