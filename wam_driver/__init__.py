@@ -11,14 +11,12 @@
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges
 - imperfections: parameters of amplifiers and sensors
-- plant: the arm in MuJoCo, stepped with motor torques
-- compiled_steps: its steps in C, where the package is built with WAM_COMPILE
+- plant: the arm in MuJoCo, stepped with motor torques; its steps in C, where the package is built with WAM_COMPILE
 - step_size: which step fits the plant's stiffest mode
 - friction: laws of dry friction and their parameters
 - dry_friction: dry friction of all motors and joints, by these laws
 - circuits: creep, slack, torque and tension of the cable circuits
 - surfaces: contact forces of all that a cover can touch
-- free_start: that nothing is inside a link at power-up
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
 - bus: the driver of a real WAM on its CAN bus, and a simulator of that bus

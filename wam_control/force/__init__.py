@@ -6,7 +6,6 @@
 ``belief``                 what is known of a force; its predicted error and doubt
 ``command_run``            the state of one command
 ``contact_place``          where a force acts: pinned or estimated
-``feed_forward``           torques of the forces and dry friction, fed forward
 ``force_axis``             how a force along a direction is sensed, how the arm moves along it, how well
 ``force_command``          which commands are admitted: limits and age
 ``force_law``              error to velocity of one axis: saturation, deadband, G_I, G_P

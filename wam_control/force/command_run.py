@@ -235,3 +235,27 @@ class CommandRun:
             square = float(axis.along.dot(axis.along))
             if not one.watch.touch.is_there and square:
                 self.approached = self.approached + axis.along * (float(axis.along.dot(moved)) / square)
+
+    def fed_forward(self, holds: bool, own: ForceLoopParameters) -> Array:
+        """Torque of the forces (n,), N m, besides their velocity: after the touch, where the place is known.
+
+        The velocity loops need not wind up to it; what they have wound up to before is left out.
+
+        Parameters
+        ----------
+        holds : whether the arm holds instead.
+        own : parameters of the force loop.
+        """
+        fed = np.zeros(len(self.approached))
+        for one in self.axes:
+            axis = one.now
+            if axis.is_force and not holds:
+                fed += own.force_feedforward * axis.desired * axis.along
+            if self.is_touching and axis.is_force and axis.place is not None:
+                if holds or not axis.place.is_known:
+                    one.wound_up = math.inf
+                    continue
+                if not math.isfinite(one.wound_up):
+                    one.wound_up = one.known.force * (own.is_estimated or one.wound_up == math.inf)
+                fed += ((1.0 - own.force_feedforward) * one.rising - one.wound_up) * axis.along
+        return fed

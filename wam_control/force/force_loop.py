@@ -19,7 +19,6 @@ from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
-from wam_control.force.feed_forward import dry_friction, force_torque
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -387,9 +386,9 @@ class ForceLoop:
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
         if velocity is not free:
             limits += self._at_ends(free, velocity)
-        fed = force_torque(run, holds, own)
+        fed = run.fed_forward(holds, own)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
-            countered = dry_friction(self._body.arm, self._map, velocity.tolist())
+            countered = _dry_friction(self._body.arm, self._map, velocity.tolist())
             friction = run.friction.step(countered, FORCE.friction_time, dt)
             fed += own.friction_feedforward * np.array(friction)
         return velocity, fed.tolist(), limits
@@ -620,3 +619,15 @@ def _row(one: AxisRun) -> AxisRow:
     measured = sign * known.force if axis.of.is_sensed else axis.at
     fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction
     return float(axis.of.kind), commanded, measured, known.sd if axis.of.is_sensed else math.nan, fraction
+
+
+def _dry_friction(arm: Arm, transmission: TransmissionMap, velocity: Sequence[float]) -> list[float]:
+    """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
+
+    Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
+    up through twice the friction, which takes them seconds.
+    """
+    turning = zip(arm.motors.dynamic_friction, transmission.motor_velocities(velocity), strict=True)
+    turned = transmission.joint_torques([friction * math.tanh(speed / FORCE.slow_motor) for friction, speed in turning])
+    moved = zip(arm.joints.dynamic_friction, velocity, turned, strict=True)
+    return [torque + friction * math.tanh(speed / FORCE.slow_joint) for friction, speed, torque in moved]
