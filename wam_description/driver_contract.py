@@ -68,7 +68,7 @@ REQUIREMENTS: Final = {
         "refuse enable if the last command is older than the watchdog",
     ),
     "current": Requirement(
-        "lets the commanded current flow when enabled; motor_currents is in A, effort in N m",
+        "lets the commanded current flow when enabled; motor_currents is in A, motor_states.effort in N m",
         "send A in motor_currents and A times arm.motors.torque_constant in the effort",
     ),
     "names": Requirement(
