@@ -49,7 +49,7 @@ class LoopDesign(NamedTuple):
         lines = [
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
             UNITS,
-            f"margin: the gain is {part:.3g} times the largest linearly stable one, {verdict.margin:.4g}",
+            f"margin: {1.0 / part:.4g}; largest linearly stable gain: {verdict.margin:.4g}",
             f"largest safe error: {verdict.stable_error:.4g}; saturation of the loop: {self.loop.error_limit:.4g}",
             *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
             f"in figure 5.8, not sampled: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
@@ -61,8 +61,8 @@ class LoopDesign(NamedTuple):
                 f"some were not followed to their end ({DESIGN.patient_events} events)"
             )
         if verdict.saturated_cycle:
-            lines.append(f"near the margin, a large step may end in another limit cycle: {verdict.saturated_cycle:.3g}")
-        lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the margin"
+            lines.append(f"a large step may end in another limit cycle, peak to peak: {verdict.saturated_cycle:.3g}")
+        lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the largest"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)
             saturate = f", or saturate the error at {error:g}" if error else ""

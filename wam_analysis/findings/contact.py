@@ -120,7 +120,7 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     if cut := " and ".join(filter(None, contact.cut)):
         yield f"{name}: {cut}."
     if contact.lasting < TOUCH.steady_link:
-        yield f"{name}: this link was estimated for {contact.lasting:.0%} of the time, others for the rest."
+        yield f"{name}: this link for {contact.lasting:.0%} of the estimated contact, others for the rest."
     yield from (f"{name}: {reason}." for reason in contact.reasons)
     if contact.true not in ("", contact.link) and not contact.is_false:
         yield f"{name}: {contact.true} was touched."
