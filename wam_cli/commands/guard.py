@@ -90,7 +90,7 @@ def _assess(given: argparse.Namespace) -> int:
     design = loop_design(FrictionNode(*(*plant, stiction)), loop, given.rate, given.delay)
     print(design.text())
     if given.picture:
-        from wam_studies.figures.map_picture import draw  # it imports matplotlib
+        from wam_studies.figures.stability import draw_loop  # it imports matplotlib
 
-        draw(design, given.picture)
+        draw_loop(design, given.picture)
     return int(not design.is_safe)

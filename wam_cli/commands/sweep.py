@@ -5,13 +5,14 @@ import csv
 import math
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from wam_analysis.drawing import MEASURED, TRUE
 from wam_cli.options import (
     BASE_CONFIGURATION,
     PICTURE,
@@ -33,11 +34,13 @@ from wam_description.configuration import option_values
 from wam_description.thresholds import FILES
 from wam_sim.batch import results
 from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, outcome, points
-from wam_studies.figures.sweeps import Sets, experiment_figure, scenario_figure
+from wam_studies.figures.style import panels
 from wam_studies.thesis import definition, sweeping
 
 SCENARIO = "demo_scenario"
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
+Sets = list[tuple[Any, ...]]
+Points = tuple[str, str, str, list[list[float]]]  # label, marker, colour, and the values of each set
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +132,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tup
         found = results(outcome, runs, batch.executor, None if is_own else batch.file, batch.report)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
-        scenario_figure(given.picture, axes, sets, found)
+        _scenario_figure(given.picture, axes, sets, found)
     return [result.failure for result in found], [result.reported for result in found]
 
 
@@ -148,7 +151,7 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> t
         rows += [(*values, one.failure, *[""] * 5)] if one.failure else []
     _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees"), rows)
     if given.picture:
-        experiment_figure(given.picture, axes, sets, found)
+        _experiment_figure(given.picture, axes, sets, found)
     return [one.failure for one in found], []
 
 
@@ -181,3 +184,46 @@ def _write(file: Path, axes: list[Axis], fields: Iterable[str], rows: Iterable[t
         writer = csv.writer(stream)
         writer.writerow([*(axis.name for axis in axes), *fields])
         writer.writerows(rows)
+
+
+def _scenario_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Sequence[SweepResult]) -> None:
+    """One panel for each parameter; runs that failed are crosses on the axis."""
+    good = [[r.force_rms] if not r.failure and math.isfinite(r.force_rms) else [] for r in found]
+    bad = [[0.0] if r.failure else [] for r in found]
+    rows = {"rms of the settled force error [N]": [("held", "o", TRUE, good), ("failed", "x", MEASURED, bad)]}
+    _draw(file, axes, sets, rows)
+
+
+def _experiment_figure(
+    file: Path, axes: Sequence[Axis], sets: Sets, found: Sequence[sweeping.ExperimentOutcome]
+) -> None:
+    """One row for each quantity that is a number, one column for each parameter."""
+    units = {c.quantity: c.unit for one in found for c in one.rows if not isinstance(c.measured, str)}
+
+    def values(quantity: str, role: str) -> list[list[float]]:
+        every = [[getattr(c, role) for c in one.rows if c.quantity == quantity] for one in found]
+        return [[value for value in some if not isinstance(value, str)] for some in every]
+
+    roles = (("predicted", TRUE), ("measured", MEASURED))
+    rows = {
+        f"{name} [{unit}]": [(role, "o", colour, values(name, role)) for role, colour in roles]
+        for name, unit in units.items()
+    }
+    _draw(file, axes, sets, rows)
+
+
+def _draw(file: Path, axes: Sequence[Axis], sets: Sets, rows: Mapping[str, Sequence[Points]]) -> None:
+    """A panel for each row and each parameter."""
+    count = max(len(rows), 1)
+    with panels(file, count, len(axes), 3.6 * len(axes), max(3.0, 2.2 * count)) as (_, shown):
+        for place, (name, lines) in enumerate(rows.items()):
+            for i, axis in enumerate(axes):
+                part = shown[place * len(axes) + i]
+                column = [row[i] if isinstance(row[i], (int, float)) else str(row[i]) for row in sets]
+                for label, marker, colour, found in lines:
+                    pairs = [(value, one) for value, some in zip(column, found, strict=True) for one in some]
+                    if pairs:
+                        across, up = zip(*pairs, strict=True)
+                        part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
+                part.set(xlabel=axis.name, ylabel=name)
+                part.legend()

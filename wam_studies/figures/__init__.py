@@ -9,7 +9,6 @@ inner_loops       figure 2.1.2: loops on torque, and on velocity or position
 backdrivability   figure 3.2.6
 closed_forms      figures 3.1 and 4.3 to 4.9, those of chapter 6
 responses         figures 5.3, 5.5, 5.9, 5.10, 5.11
-stability         figures 5.7 and 5.8; map_picture: the bound of 5.8 with a loop on it
-sweeps            results of `wam sweep` over each parameter
+stability         figures 5.7 and 5.8; the bound of 5.8 with a loop on it
 style             colours and sizes
 """

@@ -4,15 +4,19 @@ Dimensionless: frequency in sqrt((k_tr + k_c)/J_l), G times b, so that the figur
 their zeta and k_tr = k_c; the plant is the testbed with a contact and a damping for this zeta.
 """
 
+from pathlib import Path
+
 import numpy as np
 
 from wam_description.signals import ZERO
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
+from wam_studies.figures.style import draw_panels
 from wam_studies.plant.ideal_testbed import RATIO, force_step, loop_arm, loop_node, loop_plant
 from wam_theory.describing_function import friction_to_velocity
 from wam_theory.friction_model import FrictionNode
-from wam_theory.linear_loop import routh_gain
+from wam_theory.linear_loop import gain_ratio, routh_gain
+from wam_theory.loop_design import LoopDesign
 from wam_theory.regimes import friction_dominated, gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 
@@ -138,3 +142,28 @@ def plant_largest_step(gamma: float, zeta: float = CASE.unity_zeta, step: float 
         else:
             low = middle
     return float(np.sqrt(low * high))
+
+
+def draw_loop(design: LoopDesign, file: Path) -> None:
+    """Draw the bound of figure 5.8, F_dynamic over the largest stable step, with a loop on it, into a file.
+
+    The bound is that of the loop without sampling and delay; the margin is that with both, in units of gamma, for
+    this contact and all softer ones.
+    """
+    node, zeta = design.node, max(design.zeta, 1e-3)
+    stiction = node.static_friction / node.dynamic_friction if node.dynamic_friction else 1.0
+    gamma = np.linspace(1.001, float(gamma_3(zeta)), 100)
+    ratio = node.transmission_stiffness / node.contact_stiffness
+    steps = largest_stable_steps(gamma, zeta, ratio, stiction, 1e-2)
+    held = np.isfinite(steps) & (steps > 0.0)
+    plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
+    margin = float(gain_ratio(design.verdict.margin, *plant))
+    friction = node.dynamic_friction / design.loop.error_limit if design.loop.error_limit else 0.0
+    marks = (
+        Mark("linear limit (5.15)", 1.0),
+        Mark("margin as sampled", margin),
+        Mark(f"this loop: domain {design.verdict.domain}", design.gamma, friction),
+    )
+    axes = "gain γ over the linear limit [-]", "F_dynamic/F_error [-]"
+    bound = ("largest stable step", line_only(gamma[held], 1.0 / steps[held]))
+    draw_panels((Panel(f"ζ = {zeta:.3g}", *axes, (bound,), marks=marks),), file)
