@@ -157,7 +157,7 @@ class Driver:
     def _begin_period(self, tick: int) -> None:
         self._tick = tick
         self.stamp = tick * self._timing.period_ns
-        self.is_outer = (tick - 1) % self._timing.outer_divisor == 0
+        self.is_outer = self._timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: Sequence[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns.
