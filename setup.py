@@ -52,6 +52,7 @@ COMPILED = (
     "wam_control/contact/velocity_fit.py",
     "wam_control/velocity/velocity_loop.py",
     "wam_description/defects.py",
+    "wam_description/message_bus.py",
     "wam_description/rigid_body.py",
     "wam_description/signals.py",
     "wam_description/small_matrices.py",

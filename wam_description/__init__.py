@@ -16,6 +16,7 @@
 - mjcf_objects: free bodies and doors in the model for MuJoCo
 - contact_pairs: what may touch what, and the law of each contact force
 - wiring, synchroniser: declaration of a node; its inputs brought together by stamp
+- message_bus: who takes the messages of a topic, and when
 - driver_contract: what a driver of the arm promises, row by row
 - nodes, topics, interface: table of nodes, table of topics, who publishes and takes each topic
 - signals, status: the values that nodes exchange; the status of a node

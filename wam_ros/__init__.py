@@ -7,7 +7,6 @@
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
 - ros_topics: a topic of the table on ROS: name, quality of service, header
 - wire: the codec between bytes and values; messages: message objects to values and back; markers: what viewers draw
-- local_bus: messages between nodes of one process, without the middleware
 - ros_parameters: declared, described, live; remote_parameters: those of other nodes
 - requests: requests to services and their answers; client: a running stack as a program next to it sees it
 - recorder, recorder_node, recorder_interface: every topic of one run into a bag

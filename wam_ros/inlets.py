@@ -8,8 +8,8 @@ from rclpy.subscription import Subscription
 from wam_description.event import Event, fault
 from wam_description.event_text import sentence
 from wam_ros.limits import NODE_LIMITS
-from wam_ros.local_bus import Message
 from wam_ros.messages import Refused, message_type
+from wam_ros.outlets import Sent
 from wam_ros.ros_topics import listening, topic_name
 from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import decoder, requirement, stamp_in
@@ -124,20 +124,24 @@ class Inlets:
         is_local = self.listen(
             topic,
             lambda data: receive(stamp_in(data), data, decode),
-            lambda message: receive(message.stamp, message.value, require_usable),
+            lambda stamp, sent: receive(stamp, sent.value, require_usable),
         )
         self.claims[topic] = claim = PublisherClaim(node, topic, self.subscriptions[topic])
 
     def listen(
-        self, topic: str, receive: Callable[[bytes], None], take: Callable[[Message], None] = lambda message: None
+        self, topic: str, receive: Callable[[bytes], None], take: Callable[[int, Sent], None] = lambda stamp, sent: None
     ) -> bool:
-        """Subscribe to the bytes of messages.
+        """Subscribe to the bytes of messages, or in lockstep to the values that only nodes of this process publish.
+
+        To send bytes to the middleware and to fetch them, once for each listener, takes most of the time of several
+        nodes in one process (benchmarks/README.md).  They are sent all the same, for the recorder and everybody else.
+        The subscription stays, unserved: the graph shows it, and it reveals a second publisher.
 
         Parameters
         ----------
         topic : name in the table of topics.
         receive : called with them, where they come from the middleware.
-        take : called with the message, where it comes without it, see `wam_ros.local_bus`.
+        take : called with the stamp, ns, and the message, where it comes without it.
 
         Returns
         -------
@@ -148,9 +152,9 @@ class Inlets:
         profile, name = listening(row), topic_name(node, row)
         if not row.latched and node.shared.timing.mode == "realtime":
             profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
-        is_local = bus is not None and not row.latched and bus.carries(node.interface.publishers(topic))
+        is_local = bus is not None and not row.latched and node.context.carries(node.interface.publishers(topic))
         if is_local:
-            bus.subscribe(node.resolve_topic_name(name), node.bearing(take, f"a message on {topic}"))
+            bus.listen(node.resolve_topic_name(name), node.bearing(take, f"a message on {topic}"))
             profile.depth = 1
         subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
         if is_local:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -12,6 +12,13 @@ from wam_ros.messages import message_type
 from wam_ros.ros_topics import qos, topic_name
 from wam_ros.run import end_of_delivery
 from wam_ros.wire import encoder
+
+
+class Sent(NamedTuple):
+    """What listeners of the same process get: the value, and the same as bytes."""
+
+    value: Any
+    data: bytes
 
 
 class Outlets:
@@ -45,7 +52,7 @@ class Outlets:
         data = self._encoders[topic](stamp, value)
         self.send(topic, data)
         if self.bus is not None:
-            self.bus.send(self.full[topic], stamp, value, data)
+            self.bus.publish(self.full[topic], stamp, Sent(value, data))
 
     def send(self, topic: str, message: Any) -> None:
         """Publish a message, or its bytes."""

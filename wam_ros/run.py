@@ -8,7 +8,7 @@ import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -20,9 +20,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from wam_description.message_bus import QueuedBus
 from wam_description.parameters import ParameterError
-from wam_ros.limits import PROCESS_LIMITS
-from wam_ros.local_bus import LocalBus
+from wam_ros.limits import NODE_LIMITS, PROCESS_LIMITS
 from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
 from wam_ros.processors import keep_to_processors
@@ -59,14 +59,20 @@ class StackContext(Context):
 
     Attributes
     ----------
-    bus : between them, in lockstep; None where there is none.
+    bus : that hands on what only nodes of this process publish; None where there is none.
+    names : of these nodes.
     end : see `end_of_delivery`.
     failure : see `bound_leaving`.
     """
 
-    bus: LocalBus | None = None
+    bus: QueuedBus | None = None
+    names: frozenset[str] = frozenset()
     end: float
     failure: Callable[[], str]
+
+    def carries(self, publishers: Collection[str]) -> bool:
+        """Whether all nodes that publish a topic are of this process; False where none does."""
+        return bool(publishers) and self.names.issuperset(publishers)
 
 
 def end_of_delivery(context: Context) -> float:
@@ -190,7 +196,8 @@ class Nodes(Connection):
         domain_id: int | None = None,
     ) -> None:
         super().__init__(arguments, domain_id)
-        self.context.bus = LocalBus(self.executor, makers)
+        self.context.bus = QueuedBus(self.executor.create_task, NODE_LIMITS.turn)
+        self.context.names = frozenset(makers)
         self.nodes: dict[str, Any] = {}
         try:
             for name, make in makers.items():

@@ -28,7 +28,6 @@ from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
-from wam_ros.local_bus import LocalBus
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
@@ -156,14 +155,13 @@ class RunningArm:
         """Keep each message: as it is published where its publishers are of this process, else from the middleware."""
         rows = self.interface.topics
         self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
-        bus = self.context.bus if self._is_lockstep else None
         for topic, row in rows.items():
-            self._listen_to(row, self._taking(topic), bus)
+            self._listen_to(row, self._taking(topic))
 
-    def _listen_to(self, row: Topic, take: Callable[[bytes], None], bus: LocalBus | None) -> None:
-        name = topic_name(self.node, row)
-        if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(row.name)):
-            bus.subscribe(self.node.resolve_topic_name(name), lambda message: take(message.data))
+    def _listen_to(self, row: Topic, take: Callable[[bytes], None]) -> None:
+        name, bus = topic_name(self.node, row), self.context.bus if self._is_lockstep else None
+        if bus is not None and row.is_numbers and self.context.carries(self.interface.publishers(row.name)):
+            bus.listen(self.node.resolve_topic_name(name), lambda stamp, sent: take(sent.data))
         else:
             self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 

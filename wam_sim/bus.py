@@ -1,7 +1,4 @@
-"""Topics without ROS, of a simulation or a replay: each message goes at once to every reaction that takes it.
-
-A stamp is a number, ns, that only passes through here; as `Any` it need not become one of C and back in each function.
-"""
+"""Declared nodes on the topics of a simulation or a replay, and the numbers of their messages."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
@@ -10,6 +7,7 @@ from typing import Any, NamedTuple
 
 from wam_description.defects import Check
 from wam_description.interface import Feed, is_packaged
+from wam_description.message_bus import MessageBus, Publish, Take
 from wam_description.synchroniser import Inlet, OutOfTime
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs, mask
@@ -26,8 +24,8 @@ class TopicValue(NamedTuple):
 Rows = dict[str, list[TopicValue]]
 
 
-class Bus:
-    """Hands messages on, in the order of the declared nodes.
+class NodeBus(MessageBus):
+    """Connects declared nodes, in their order.
 
     Parameters
     ----------
@@ -35,16 +33,12 @@ class Bus:
     """
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
-        self._takers: dict[str, list[_Take]] = {name: [] for name in topics}
+        super().__init__()
         self._kept = {name: _Kept(_ROWS[topic.type]) for name, topic in topics.items() if topic.type in _ROWS}
         for name, kept in self._kept.items():
             self.listen(name, kept.add)
         self._rows: Rows = {}
         self._outlets: dict[str, _Outlets] = {}  # by node
-
-    def listen(self, topic: str, take: "_Take") -> None:
-        """Call a function with stamp, ns, and value of each message of a topic."""
-        self._takers[topic].append(take)
 
     def connect(
         self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
@@ -66,27 +60,12 @@ class Bus:
         is_masked = not is_packaged(declaration)
         for topic, found in feeds.items():
             reactions = [(_inlet(feed, topic, is_masked), feed.work) for feed in found]
-            self._takers.setdefault(topic, []).append(_taker(reactions, outlets))
+            self.listen(topic, _taker(reactions, outlets))
 
     def publish_of(self, node: str, stamp: int, outputs: Outputs) -> None:
         """Publish what a connected node returned elsewhere than in a step, as its steps' outputs are published."""
         for name, output in outputs.items():
             self._outlets[node][name](stamp, output)
-
-    def publish(self, topic: str, stamp: Any, value: Any) -> None:
-        """Publish a value of a stamp, ns, and what the nodes publish in turn."""
-        for take in self._takers[topic]:
-            take(stamp, value)
-
-    def publisher(self, topic: str) -> "_Outlet":
-        """What `publish` does on one topic, as a function of stamp and value."""
-        takers = self._takers.setdefault(topic, [])
-
-        def publish(stamp: Any, value: Any) -> None:
-            for take in takers:
-                take(stamp, value)
-
-        return publish
 
     @property
     def rows(self) -> Rows:
@@ -146,18 +125,14 @@ class _Kept:
         ]
 
 
-_Take = Callable[[Any, Any], object]
-_Outlet = Callable[[Any, Any], None]
-
-
-class _Outlets(dict[str, _Outlet]):
+class _Outlets(dict[str, Publish]):
     """What publishes on the topics that a node declares."""
 
     def __init__(self, declaration: Declaration) -> None:
         super().__init__()
         self._declaration = declaration
 
-    def __missing__(self, topic: str) -> _Outlet:
+    def __missing__(self, topic: str) -> Publish:
         self._declaration.require_declared({topic: None})
         raise KeyError(topic)
 
@@ -168,12 +143,12 @@ def _inlet(feed: Feed, topic: str, is_masked: bool) -> Inlet:
     return (lambda stamp, value: inlet(stamp, masked(value))) if is_masked else inlet
 
 
-def _checked(publish: _Outlet, check: Check | None) -> _Outlet:
+def _checked(publish: Publish, check: Check | None) -> Publish:
     """What publishes values as others take them; an unusable one is refused."""
     return publish if check is None else lambda stamp, value: publish(stamp, check(value))
 
 
-def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets: _Outlets) -> _Take:
+def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets: _Outlets) -> Take:
     """What hands a message to the reactions of a node, and publishes what they answer when all have worked.
 
     One whose newest state is too old refuses it, as over topics; the driver brakes then and names the node.

@@ -26,7 +26,7 @@ from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Inputs, Outputs
-from wam_sim.bus import Bus, TopicValue, flat
+from wam_sim.bus import NodeBus, TopicValue, flat
 from wam_sim.recorded_run import RecordedRun, recorded_run
 
 # fields of messages with three axes, and their units
@@ -246,7 +246,7 @@ def _run(
         topic: [feed._replace(work=changing(feed.work)) for feed in found]
         for topic, found in interface.feeds(declaration, node).items()
     }
-    bus = Bus({name: interface.topics[name] for name in declaration.outputs if name in interface.topics})
+    bus = NodeBus({name: interface.topics[name] for name in declaration.outputs if name in interface.topics})
     bus.connect(declaration, feeds, interface.checks(declaration))
     recorded = [interface.topics[topic] for topic in feeds if topic not in declaration.outputs]
     for _, topic, stamp, value in _messages(bag, namespace, recorded, shared):

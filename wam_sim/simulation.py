@@ -17,15 +17,15 @@ from wam_description.configuration import Configuration
 from wam_description.event import Event, Level
 from wam_description.event_text import news
 from wam_description.interface import Interface, require_sections
-from wam_description.parameters import ParameterError, build
+from wam_description.parameters import ParameterError, build, meant, require
 from wam_description.signals import NodeStatus, State
 from wam_description.synchroniser import Synchroniser
-from wam_description.topics import STATUS
+from wam_description.topics import EVERY_NODE, STATUS
 from wam_description.wiring import Call, Declaration, Inputs, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import unpublished
 from wam_driver.safety import Mode
-from wam_sim.bus import Bus, Rows, of_node
+from wam_sim.bus import NodeBus, Rows, of_node
 from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
 
 SCENARIO = "scenario"
@@ -71,7 +71,7 @@ class Simulation:
         own = dict(controllers or {})
         self._interface = Interface(shared, own)
         self._settings = {name: dict(flat) for name, flat in configuration.sections.items()}
-        self._bus = Bus(self._interface.topics)
+        self._bus = NodeBus(self._interface.topics)
         self._bus.listen("motor_current_command", self._command)
         self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
         self._publish = self._bus.publish
@@ -171,6 +171,8 @@ class Simulation:
 
     def listen(self, topic: str, take: Callable[[int, Any], None], node: str = "") -> None:
         """Call a function with stamp, ns, and value of each message of a topic; of one that all publish, of a node."""
+        known = {*self._interface.topics, *EVERY_NODE}
+        require(topic in known, f"no topic is named '{topic}'; {meant(topic, known)}topics: {', '.join(sorted(known))}")
         self._bus.listen(of_node(node, topic), take)
 
     def play(self) -> str:

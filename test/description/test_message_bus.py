@@ -1,0 +1,37 @@
+"""Messages between nodes of one process: order and turns."""
+
+from collections import deque
+from collections.abc import Callable
+
+from wam_description.message_bus import MessageBus, QueuedBus
+
+
+def echoes(bus: MessageBus, count: int) -> list[str]:
+    """What two listeners of a topic note of so many pings, each of which one of them answers with the next."""
+    seen: list[str] = []
+
+    def answer(stamp: int, value: str) -> None:
+        seen.append(f"first {value}{stamp}")
+        if stamp < count:
+            bus.publish("/ping", stamp + 1, value)
+
+    bus.listen("/ping", answer)
+    bus.listen("/ping", lambda stamp, value: seen.append(f"second {value}{stamp}"))
+    bus.publish("/ping", 1, "p")
+    return seen
+
+
+def test_at_once_an_answer_comes_before_the_next_listener_has_the_question() -> None:
+    assert echoes(MessageBus(), 2) == ["first p1", "first p2", "second p2", "second p1"]
+
+
+def test_in_turns_an_answer_waits_until_all_have_the_question_and_others_have_their_turn() -> None:
+    tasks: deque[Callable[[], None]] = deque()
+    most = 3
+    seen = echoes(QueuedBus(tasks.append, most), 2 * most)
+    assert not seen
+    tasks.append(lambda: seen.append("other"))
+    while tasks:
+        tasks.popleft()()
+    pings = [f"{who} p{stamp}" for stamp in range(1, 2 * most + 1) for who in ("first", "second")]
+    assert seen == [*pings[: 2 * most], "other", *pings[2 * most :]]

@@ -1,0 +1,77 @@
+"""Topics within one process: who takes the messages of each, and when they are handed over.
+
+A simulation and a replay hand each message on at once: their clocks are the periods of the plant and the recorded
+stamps.  Nodes over ROS take turns with all else that their executor does.  Which messages make a step, and after what
+delay, is in the stamps (`wam_description.synchroniser`), so that the bits are the same.  A stamp is a number, ns, that
+only passes through here; as `Any` it need not become one of C and back in each function.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+Take = Callable[[Any, Any], object]  # of a message: stamp, ns, and value
+Publish = Callable[[Any, Any], None]
+
+
+class MessageBus:
+    """Hands each message at once to all that take its topic, in the order in which they began to listen."""
+
+    def __init__(self) -> None:
+        self._takers: dict[str, list[Take]] = {}
+
+    def listen(self, topic: str, take: Take) -> None:
+        """Call a function with stamp, ns, and value of each message of a topic."""
+        self._takers.setdefault(topic, []).append(take)
+
+    def publisher(self, topic: str) -> Publish:
+        """A function that publishes on a topic: stamp, ns, and value, and what is published in answer to them."""
+        takers = self._takers.setdefault(topic, [])
+
+        def publish(stamp: Any, value: Any) -> None:
+            for take in takers:
+                take(stamp, value)
+
+        return publish
+
+    def publish(self, topic: str, stamp: Any, value: Any) -> None:
+        """Publish one value of a stamp, ns."""
+        self.publisher(topic)(stamp, value)
+
+
+class QueuedBus(MessageBus):
+    """Hands messages on in the order in which they were published, some of them in each turn of an executor.
+
+    Parameters
+    ----------
+    later : lets the executor call a function in its turn.
+    most : messages in one turn.
+    """
+
+    def __init__(self, later: Callable[[Callable[[], None]], object], most: int) -> None:
+        super().__init__()
+        self._later, self._most = later, most
+        self._waiting: deque[tuple[list[Take], Any, Any]] = deque()
+
+    def publisher(self, topic: str) -> Publish:
+        """A function that publishes on a topic: stamp, ns, and value, which wait for their turn."""
+        takers, waiting = self._takers.setdefault(topic, []), self._waiting
+
+        def publish(stamp: Any, value: Any) -> None:
+            if takers:
+                if not waiting:
+                    self._later(self._turn)
+                waiting.append((takers, stamp, value))
+
+        return publish
+
+    def _turn(self) -> None:
+        waiting = self._waiting
+        for _ in range(self._most):
+            takers, stamp, value = waiting[0]
+            for take in takers:
+                take(stamp, value)
+            waiting.popleft()  # only now, so that what they publish does not ask for a turn of its own
+            if not waiting:
+                return
+        self._later(self._turn)
