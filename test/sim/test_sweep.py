@@ -13,7 +13,8 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_sim.batch import results
 from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points
-from wam_studies.thesis import definition, sweeping
+from wam_studies.thesis import definition
+from wam_studies.thesis.study import measure, swept
 
 GAIN = "force_loop:force_gain"
 STEPS = """
@@ -232,9 +233,9 @@ def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Pat
 
 def test_a_refused_set_of_an_experiment_fails_alone_and_an_unknown_parameter_before_anything_runs() -> None:
     experiment = definition.load("creep")
-    (point,) = sweeping.points(experiment, [Axis(GAIN, (-1.0,))], [(-1.0,)])
-    found = sweeping.outcome(point)
+    (case,) = swept(experiment, [Axis(GAIN, (-1.0,))], [(-1.0,)])
+    found = measure(case)
     assert "force_gain" in found.failure
-    assert not found.rows
+    assert not found.result.rows
     with pytest.raises(ParameterError, match="no parameter 'nothing'"):
-        sweeping.points(experiment, [Axis("force_loop:nothing", (1,))], [(1,)])
+        swept(experiment, [Axis("force_loop:nothing", (1,))], [(1,)])

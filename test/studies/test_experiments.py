@@ -30,7 +30,7 @@ from wam_studies.thesis.evaluation import function_of
 from wam_studies.thesis.one_link import one_link, played
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result
-from wam_studies.thesis.sweeping import SweptRun, record_run
+from wam_studies.thesis.study import ExperimentCase, measure
 
 LEVER = 0.9144  # m
 STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad
@@ -364,7 +364,7 @@ def test_creep_runs_and_is_judged_again_from_its_bag(tmp_path: Path, capfd) -> N
     assert run_command("creep", "--directory", str(tmp_path), "--name", "mine") == 0
     said = capfd.readouterr()
     assert "\nall quantities of this table" in said.out
-    assert "runs: 1 of 1" in said.err
+    assert "experiments: 1 of 1" in said.err
     assert (tmp_path / "mine" / "result.png").is_file()
     (tmp_path / "mine" / "result.png").unlink()
     again = ("--directory", str(tmp_path / "again"), "--evaluate")
@@ -375,6 +375,8 @@ def test_creep_runs_and_is_judged_again_from_its_bag(tmp_path: Path, capfd) -> N
     assert not (tmp_path / "mine" / "result.png").exists(), "an evaluation leaves the recording as it is"
     assert run_command("creep", *again, str(tmp_path / "mine" / "out_and_back")) == 0
     capfd.readouterr()
+    assert run_command("creep", "--directory", str(tmp_path), "--name", "mine") == 2
+    assert f"bag {tmp_path / 'mine' / 'out_and_back'} exists already" in capfd.readouterr().err
     # a bound that is missed: the same bag for an experiment in which the driver should have stopped the arm
     other = tmp_path / "creep.yaml"
     text = packaged("experiments/creep").read_text()
@@ -387,7 +389,8 @@ def test_a_run_that_is_not_whole_is_not_judged(tmp_path: Path, capfd) -> None:
     file, whole = tmp_path / "short.yaml", yaml.safe_load(packaged("experiments/creep").read_text())
     file.write_text(yaml.safe_dump(whole))
     (run,) = load(str(file)).runs
-    record_run(SweptRun(load(str(file)), run._replace(steps=run.steps[:1]), str(tmp_path / "mine")))
+    short = load(str(file))._replace(runs=(run._replace(steps=run.steps[:1]),))
+    measure(ExperimentCase(short, str(tmp_path / "mine")))
     assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 2
     said = capfd.readouterr().err
     assert f"run 'out_and_back' ended in step '{run.steps[0]['name']}', 0 of {len(run.steps)} steps finished; " in said

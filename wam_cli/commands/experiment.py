@@ -1,4 +1,4 @@
-"""`wam experiment`: experiments of the thesis, run in lockstep, recorded, evaluated; their sample bags."""
+"""`wam experiment`: experiments of the thesis as a study, whose bags are kept; their sample bags."""
 
 import argparse
 import contextlib
@@ -11,16 +11,18 @@ from pathlib import Path
 from wam_analysis.table import markdown
 from wam_bag.bag_name import dated
 from wam_cli.options import PAGE, bounded, writable_directory
+from wam_description.configuration import Configuration, packaged
 from wam_ros.bring_up import Composition
-from wam_sim.batch import processes, results
+from wam_sim.batch import processes
 from wam_sim.progress import Progress
 from wam_studies.figures.style import draw_panels
+from wam_studies.harness import evaluate
 from wam_studies.page import kept_rows, section_of, with_section
+from wam_studies.thesis import evaluation
 from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
-from wam_studies.thesis.evaluation import evaluate, text
 from wam_studies.thesis.rows import PAGE_HEAD, Result, summary
 from wam_studies.thesis.samples import FOLDER, INDEX, LIMIT, Entry, check, make, read_index, write_index
-from wam_studies.thesis.sweeping import SweptRun, record_run
+from wam_studies.thesis.study import ExperimentCase, ExperimentRecord, ExperimentStudy
 
 PICTURE = "result.png"
 SECTION = "experiments"  # of the page
@@ -75,22 +77,30 @@ def run(given: argparse.Namespace) -> int:
     writable_directory(str(given.directory))
     chosen = list(map(load, names() if given.all else given.experiment))
     directories = [_directory(given, one, len(chosen) == 1 and not given.all) for one in chosen]
-    if not given.evaluate:
-        _record(chosen, directories, given.jobs)
+    cases = tuple(ExperimentCase(one, str(directory)) for one, directory in zip(chosen, directories, strict=True))
+    study = ExperimentStudy(Configuration.load(packaged(chosen[0].configuration)), cases)
+    if given.evaluate:
+        records = [ExperimentRecord(one.name, "", evaluation.evaluate(one, Path(bags))) for one, bags in cases]
+    else:
+        with processes(min(given.jobs, len(cases))) as executor:
+            records = evaluate(study, {1: cases}, executor, report=Progress("experiments", sys.stderr)).total
     found = []
-    for experiment, directory in zip(chosen, directories, strict=True):
+    for experiment, directory, record in zip(chosen, directories, records, strict=True):
+        result = record.result
+        if record.failure:
+            print(f"{record.name}: {record.failure}", file=sys.stderr)
+            continue
         picture = given.directory / f"{experiment.name}.png" if given.evaluate else directory / PICTURE
-        result = evaluate(experiment, directory)
         drawn = ""
         if result.panels:
             picture.parent.mkdir(parents=True, exist_ok=True)
             draw_panels(result.panels, picture, 2, f"{experiment.title} (section {experiment.section})")
             drawn = f"picture  {picture}\n"
-        print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
+        print(f"{evaluation.text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
         found.append((experiment, result, picture))
     if given.write:
         _write(given.write, found)
-    return 0 if all(result.agrees for _, result, _ in found) else 1
+    return 2 if len(found) < len(records) else int(bool(study.score(records).missed))
 
 
 def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) -> Path:
@@ -99,17 +109,6 @@ def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) 
         return Path(given.evaluate if is_one else given.evaluate / experiment.name)
     name = given.name or dated(experiment.name)
     return Path(given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}"))
-
-
-def _record(chosen: list[Experiment], directories: list[Path], jobs: int) -> None:
-    """Record every run of each experiment into its directory, in processes; progress goes to stderr."""
-    cases = [
-        SweptRun(experiment, run, str(directory))
-        for experiment, directory in zip(chosen, directories, strict=True)
-        for run in experiment.runs
-    ]
-    with processes(min(jobs, len(cases))) as executor:
-        results(record_run, cases, executor, report=Progress("runs", sys.stderr))
 
 
 def _write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> None:

@@ -35,7 +35,8 @@ from wam_description.thresholds import FILES
 from wam_sim.batch import results
 from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, outcome, points
 from wam_studies.figures.style import panels
-from wam_studies.thesis import definition, sweeping
+from wam_studies.thesis import definition
+from wam_studies.thesis.study import ExperimentRecord, measure, swept
 
 SCENARIO = "demo_scenario"
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
@@ -142,12 +143,12 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> t
         raise ValueError(
             "an experiment has its own configuration; leave out --config and --set, and change its numbers with --vary"
         )
-    runs = sweeping.points(definition.load(given.experiment), axes, sets)
-    with batch_of(given, len(runs)) as batch:
-        found = results(sweeping.outcome, runs, *batch)
+    cases = swept(definition.load(given.experiment), axes, sets)
+    with batch_of(given, len(cases)) as batch:
+        found = results(measure, cases, *batch)
     rows: list[tuple[Any, ...]] = []
     for values, one in zip(sets, found, strict=True):
-        rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees) for c in one.rows]
+        rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees) for c in one.result.rows]
         rows += [(*values, one.failure, *[""] * 5)] if one.failure else []
     _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees"), rows)
     if given.picture:
@@ -194,14 +195,12 @@ def _scenario_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Sequen
     _draw(file, axes, sets, rows)
 
 
-def _experiment_figure(
-    file: Path, axes: Sequence[Axis], sets: Sets, found: Sequence[sweeping.ExperimentOutcome]
-) -> None:
+def _experiment_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Sequence[ExperimentRecord]) -> None:
     """One row for each quantity that is a number, one column for each parameter."""
-    units = {c.quantity: c.unit for one in found for c in one.rows if not isinstance(c.measured, str)}
+    units = {c.quantity: c.unit for one in found for c in one.result.rows if not isinstance(c.measured, str)}
 
     def values(quantity: str, role: str) -> list[list[float]]:
-        every = [[getattr(c, role) for c in one.rows if c.quantity == quantity] for one in found]
+        every = [[getattr(c, role) for c in one.result.rows if c.quantity == quantity] for one in found]
         return [[value for value in some if not isinstance(value, str)] for some in every]
 
     roles = (("predicted", TRUE), ("measured", MEASURED))

@@ -37,9 +37,14 @@ class Comparison(NamedTuple):
         return difference / abs(self.predicted) if self.predicted else math.inf
 
     @property
+    def is_claimed(self) -> bool:
+        """Whether the quantity has to agree."""
+        return not math.isnan(self.bound)
+
+    @property
     def agrees(self) -> bool:
         """Whether the deviation is within its bound; a missing measurement does not agree."""
-        if math.isnan(self.bound):
+        if not self.is_claimed:
             return True
         if isinstance(self.predicted, str) or isinstance(self.measured, str):
             return self.predicted == self.measured
@@ -103,7 +108,7 @@ def cells(row: Comparison) -> tuple[str, ...]:
         _deviation(row, row.deviation, "+"),
         _deviation(row, row.bound, ""),
         row.equation,
-        "" if math.isnan(row.bound) else "ok" if row.agrees else "MISSED",
+        "" if not row.is_claimed else "ok" if row.agrees else "MISSED",
     )
 
 
@@ -126,7 +131,7 @@ def _page_cells(row: Comparison) -> tuple[str, ...]:
 
 def summary(rows: Sequence[Comparison]) -> tuple[str, ...]:
     """How many rows agree, and the cells of the row that is nearest to its bound, in the order of `PAGE_HEAD`."""
-    claimed = [row for row in rows if not math.isnan(row.bound)]
+    claimed = [row for row in rows if row.is_claimed]
     agreeing = sum(row.agrees for row in claimed)
     verdict = f"{agreeing} of {len(claimed)}" + (" MISSED" if agreeing < len(claimed) else "")
     return verdict, *_page_cells(max(claimed, key=lambda row: row.nearness))

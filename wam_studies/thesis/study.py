@@ -1,0 +1,96 @@
+"""Experiments and tasks on the harness: a case is an experiment, whose runs are recorded into bags and evaluated."""
+
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+from wam_bag.errors import BagError, RecordingError
+from wam_control.task.scenario import load_for
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_description.wiring import raised
+from wam_sim.simulated_bag import record
+from wam_sim.sweep import Axis
+from wam_studies.harness import Study
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, exact
+from wam_studies.thesis.definition import Experiment, configured
+from wam_studies.thesis.evaluation import evaluate
+from wam_studies.thesis.rows import Result
+
+
+class ExperimentCase(NamedTuple):
+    """An experiment, and the directory of its bags; without one they last until they are evaluated."""
+
+    experiment: Experiment
+    directory: str = ""
+
+
+class ExperimentRecord(NamedTuple):
+    """The result of an experiment, or why there is none."""
+
+    name: str
+    failure: str
+    result: Result = Result((), ())
+
+
+def measure(case: ExperimentCase) -> ExperimentRecord:
+    """Record every run, in lockstep without ROS, and evaluate the bags; what fails is a failure of this case alone."""
+    experiment, kept = case
+    with nullcontext(kept) if kept else TemporaryDirectory(prefix="wam_experiment_") as directory:
+        try:
+            for run in experiment.runs:
+                configuration, bag = configured(experiment, run, Path(directory)), Path(directory, run.name)
+                record(configuration, load_for(configuration, f"{bag}.yaml"), bag)
+            result = evaluate(experiment, Path(directory))
+        except (ParameterError, BagError, RecordingError) as error:
+            return ExperimentRecord(experiment.name, str(error) if kept else str(error).replace(f"{directory}/", ""))
+        except Exception as error:
+            return ExperimentRecord(experiment.name, f"unexpected {raised(error)}")
+    # the curves of many sets would be too much to keep
+    return ExperimentRecord(experiment.name, "", result if kept else result._replace(panels=()))
+
+
+@dataclass(frozen=True)
+class ExperimentStudy(Study[ExperimentCase, ExperimentRecord]):
+    """Whether what is measured in experiments is what is predicted; nothing is drawn from the seed."""
+
+    title = "experiments of the thesis, and whole-arm tasks"
+    page = "docs/experiments.md"
+    seeds = (1,)
+
+    chosen: tuple[ExperimentCase, ...] = ()
+
+    def cases(self, seed: int) -> Sequence[ExperimentCase]:
+        """Those that were chosen."""
+        return self.chosen
+
+    run = staticmethod(measure)
+
+    def score(self, records: Sequence[ExperimentRecord]) -> Scores:
+        """How many quantities of each experiment are outside of their bounds; none may be."""
+        rows = []
+        for name, _, result in records:
+            agree = [one.agrees for one in result.rows if one.is_claimed]
+            rows.append(Row(f"{name}, outside of bounds", exact(agree.count(False), len(agree)), required=NONE_AT_ALL))
+        return Scores(rows)
+
+
+def swept(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence[Any]]) -> list[ExperimentCase]:
+    """The experiment with each of these parameter sets in place of its own values.
+
+    Raises
+    ------
+    ParameterError
+        where its configuration has no such parameter.
+    """
+    base = Configuration.load(packaged(experiment.configuration))
+    cases = []
+    for values in sets:
+        named = {axis.name: value for axis, value in zip(axes, values, strict=True)}
+        base.with_values(named)  # refuses unknown names before anything runs
+        runs = tuple(run._replace(values={**run.values, **named}) for run in experiment.runs)
+        cases.append(ExperimentCase(experiment._replace(runs=runs)))
+    return cases
