@@ -85,7 +85,7 @@ def test_what_goes_in_is_counted_in_the_row_that_it_is_of() -> None:
     assert rows["10 N on the inner link detected within 200 ms, every arm"].found[::3] == (0.5, 2)
     assert rows["90 % set contains the truth at 20 N, mu 0.8, every arm, masses included"].found[::3] == (0.0, 1)
     assert rows["90 % set contains the truth, contacts of 0.2 to 10 s"].found[::3] == (1.0, 1)
-    assert rows["time in contact with a wrong link identified, every arm"].found.value == pytest.approx(0.5 / 180.0)
+    assert rows["contact time with a wrong link, probability > 0.95, every arm"].found.value == pytest.approx(0.5 / 180)
     assert rows_of([]) == {}
 
 

@@ -263,7 +263,7 @@ def degraded_rows(drives: Scores) -> Iterator[Row]:
     yield from named([inner_row(both)], "every arm")
     yield from named([set_row([one for score in lasting for one in score.outcomes])], "contacts of 0.2 to 10 s")
     wrong = sure_and_wrong([*both, *lasting])
-    yield percent("time in contact with a wrong link identified, every arm", wrong, (0.0, 0.005), (0.0, 0.002))
+    yield percent("contact time with a wrong link, probability > 0.95, every arm", wrong, (0.0, 0.005), (0.0, 0.002))
 
 
 def _worst(rows: Mapping[str, Row]) -> Iterator[Row]:
