@@ -51,27 +51,38 @@ class QueuedBus(MessageBus):
     def __init__(self, later: Callable[[Callable[[], None]], object], most: int) -> None:
         super().__init__()
         self._later, self._most = later, most
-        self._waiting: deque[tuple[list[Take], Any, Any]] = deque()
+        self._next: deque[tuple[list[Take], deque[tuple[Any, Any]]]] = deque()  # whose message is next
 
-    def publisher(self, topic: str) -> Publish:
-        """A function that publishes on a topic: stamp, ns, and value, which wait for their turn."""
-        takers, waiting = self._takers.setdefault(topic, []), self._waiting
+    def publisher(self, topic: str, depth: int = 1) -> Publish:
+        """A function that publishes on a topic: stamp, ns, and value, which wait for their turn.
+
+        Parameters
+        ----------
+        topic : its name.
+        depth : messages that wait at most; of more the oldest is dropped.
+        """
+        takers, following = self._takers.setdefault(topic, []), self._next
+        waiting: deque[tuple[Any, Any]] = deque(maxlen=depth)
 
         def publish(stamp: Any, value: Any) -> None:
-            if takers:
-                if not waiting:
-                    self._later(self._turn)
-                waiting.append((takers, stamp, value))
+            if not takers:
+                return
+            if not following:
+                self._later(self._turn)
+            if len(waiting) < depth:
+                following.append((takers, waiting))
+            waiting.append((stamp, value))
 
         return publish
 
     def _turn(self) -> None:
-        waiting = self._waiting
+        following = self._next
         for _ in range(self._most):
-            takers, stamp, value = waiting[0]
+            takers, waiting = following[0]
+            stamp, value = waiting.popleft()
             for take in takers:
                 take(stamp, value)
-            waiting.popleft()  # only now, so that what they publish does not ask for a turn of its own
-            if not waiting:
+            following.popleft()  # only now, so that what they publish does not ask for a turn of its own
+            if not following:
                 return
         self._later(self._turn)

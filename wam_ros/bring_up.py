@@ -230,12 +230,19 @@ class Composition(Nodes):
     configuration : values for all nodes; its `shared.nodes` names which ones are made.
     namespace : namespace of the nodes.
     domain_id : ROS domain, the one of the environment where None.
+    is_split : as for `Nodes`.
     """
 
-    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        namespace: str = NAMESPACE,
+        domain_id: int | None = None,
+        is_split: bool = False,
+    ) -> None:
         with parameter_file(configuration) as file:
             own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
-            super().__init__(node_makers(configuration.shared.nodes, **own), (), namespace, domain_id)
+            super().__init__(node_makers(configuration.shared.nodes, **own), (), namespace, domain_id, is_split)
 
     def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> str:
         """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it.

@@ -10,7 +10,7 @@ from wam_description.event_text import sentence
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.messages import Refused, message_type
 from wam_ros.outlets import Sent
-from wam_ros.ros_topics import listening, topic_name
+from wam_ros.ros_topics import listening, topic_name, waiting
 from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import decoder, requirement, stamp_in
 
@@ -131,11 +131,11 @@ class Inlets:
     def listen(
         self, topic: str, receive: Callable[[bytes], None], take: Callable[[int, Sent], None] = lambda stamp, sent: None
     ) -> bool:
-        """Subscribe to the bytes of messages, or in lockstep to the values that only nodes of this process publish.
+        """Subscribe to the bytes of messages, or to the values that only nodes of this process publish.
 
-        To send bytes to the middleware and to fetch them, once for each listener, takes most of the time of several
-        nodes in one process (benchmarks/README.md).  They are sent all the same, for the recorder and everybody else.
-        The subscription stays, unserved: the graph shows it, and it reveals a second publisher.
+        To fetch bytes from the middleware, once for each listener, took most of the time of several nodes in one
+        process.  The bytes are sent all the same, for the recorder and everybody else.  The subscription stays,
+        unserved: the graph shows it, and it reveals a second publisher.
 
         Parameters
         ----------
@@ -150,8 +150,8 @@ class Inlets:
         node, bus = self._node, self._node.outlets.bus
         row = node.interface.topics[topic]
         profile, name = listening(row), topic_name(node, row)
-        if not row.latched and node.shared.timing.mode == "realtime":
-            profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
+        if not row.latched:
+            profile.depth = waiting(node.shared.timing)
         is_local = bus is not None and not row.latched and node.context.carries(node.interface.publishers(topic))
         if is_local:
             bus.listen(node.resolve_topic_name(name), node.bearing(take, f"a message on {topic}"))

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 
+from wam_description.message_bus import QueuedBus
 from wam_description.topics import BY_NAME, EVERY_NODE, Topic
 from wam_ros.messages import message_type
-from wam_ros.ros_topics import qos, topic_name
+from wam_ros.ros_topics import qos, topic_name, waiting
 from wam_ros.run import end_of_delivery
 from wam_ros.wire import encoder
 
@@ -31,14 +32,14 @@ class Outlets:
 
     Attributes
     ----------
-    bus : that carries messages within the process; None in realtime, where a late node needs the newest only.
+    bus : that carries messages within the process; None where there is none.
     published : messages so far, by topic.
     full : full name of each topic.
     """
 
     def __init__(self, node: Any, rows: Sequence[Topic]) -> None:
         self._node = node
-        self.bus = getattr(node.context, "bus", None) if node.shared.timing.mode == "lockstep" else None
+        self.bus: QueuedBus | None = getattr(node.context, "bus", None)
         every = [*rows, *(BY_NAME[name] for name in EVERY_NODE)]  # on these each node publishes messages
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
@@ -46,13 +47,15 @@ class Outlets:
         self._encoders = {row.name: encoder(row, node.shared) for row in rows}
         self.published = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
+        bus, most = self.bus, waiting(node.shared.timing)
+        self._here = {row.name: bus.publisher(self.full[row.name], most) for row in rows} if bus else {}
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
         data = self._encoders[topic](stamp, value)
         self.send(topic, data)
-        if self.bus is not None:
-            self.bus.publish(self.full[topic], stamp, Sent(value, data))
+        if here := self._here.get(topic):
+            here(stamp, Sent(value, data))
 
     def send(self, topic: str, message: Any) -> None:
         """Publish a message, or its bytes."""

@@ -7,7 +7,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
+from wam_description.arm import Timing
 from wam_description.topics import DEPTH, Topic
+from wam_ros.limits import NODE_LIMITS
 
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 DIAGNOSTICS = "/diagnostics"
@@ -40,6 +42,11 @@ def listening(topic: Topic) -> QoSProfile:
     profile = qos(topic)
     profile.depth = DEPTH
     return profile
+
+
+def waiting(timing: Timing) -> int:
+    """How many messages of a topic wait for a node: in realtime, a late one works on the newest state."""
+    return NODE_LIMITS.newest_kept if timing.mode == "realtime" else DEPTH
 
 
 def header(stamp: int, frame: str = "") -> Header:

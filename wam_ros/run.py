@@ -175,13 +175,14 @@ class Connection(Closing):
 
 
 class Nodes(Connection):
-    """Nodes of this process; in lockstep they hand each other their messages.
+    """Nodes of this process, which hand each other their messages.
 
     Parameters
     ----------
     makers : what makes each node, by its name; called with ``context`` and ``namespace``.
     arguments, domain_id : as for `Connection`.
     namespace : of the nodes.
+    is_split : whether their messages go through the middleware all the same, as between processes.
 
     Attributes
     ----------
@@ -194,9 +195,10 @@ class Nodes(Connection):
         arguments: Sequence[str],
         namespace: str = NAMESPACE,
         domain_id: int | None = None,
+        is_split: bool = False,
     ) -> None:
         super().__init__(arguments, domain_id)
-        self.context.bus = QueuedBus(self.executor.create_task, NODE_LIMITS.turn)
+        self.context.bus = None if is_split else QueuedBus(self.executor.create_task, NODE_LIMITS.turn)
         self.context.names = frozenset(makers)
         self.nodes: dict[str, Any] = {}
         try:

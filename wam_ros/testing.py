@@ -159,7 +159,7 @@ class RunningArm:
             self._listen_to(row, self._taking(topic))
 
     def _listen_to(self, row: Topic, take: Callable[[bytes], None]) -> None:
-        name, bus = topic_name(self.node, row), self.context.bus if self._is_lockstep else None
+        name, bus = topic_name(self.node, row), self.context.bus
         if bus is not None and row.is_numbers and self.context.carries(self.interface.publishers(row.name)):
             bus.listen(self.node.resolve_topic_name(name), lambda stamp, sent: take(sent.data))
         else:

@@ -35,3 +35,12 @@ def test_in_turns_an_answer_waits_until_all_have_the_question_and_others_have_th
         tasks.popleft()()
     pings = [f"{who} p{stamp}" for stamp in range(1, 2 * most + 1) for who in ("first", "second")]
     assert seen == [*pings[: 2 * most], "other", *pings[2 * most :]]
+
+
+def test_of_more_messages_than_its_depth_a_topic_keeps_the_newest() -> None:
+    tasks, seen = deque[Callable[[], None]](), list[int]()
+    bus = QueuedBus(tasks.append, 9)
+    bus.listen("/a", lambda stamp, value: seen.append(stamp))
+    list(map(bus.publisher("/a", 2), range(5), "abcde"))
+    tasks.popleft()()
+    assert (seen, len(tasks)) == ([3, 4], 0)

@@ -29,7 +29,7 @@ from wam_ros.bring_up import Composition, Processes
 from wam_ros.limits import CALL_LIMITS, PROCESS_LIMITS
 from wam_ros.process_signals import LISTENER_GONE
 from wam_ros.ros_topics import qos
-from wam_ros.run import StackContext, prepare_logging_directory, run
+from wam_ros.run import prepare_logging_directory, run
 
 ROOT = Path(__file__).parents[2]
 NODES = 7  # six and the recorder
@@ -390,13 +390,6 @@ def test_a_reader_who_has_had_enough_is_no_error() -> None:
     )
     os.close(write)
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
-
-
-def test_a_topic_that_a_node_elsewhere_publishes_is_left_to_the_middleware() -> None:
-    context = StackContext()
-    context.names = frozenset({"driver", "force_loop"})
-    carried = {publishers: context.carries(publishers) for publishers in (("driver",), ("driver", "program"), ())}
-    assert carried == {("driver",): True, ("driver", "program"): False, (): False}
 
 
 @pytest.mark.parametrize(

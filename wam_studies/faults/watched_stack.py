@@ -76,7 +76,7 @@ class WatchedStack(StackClient):
         configuration = configuration.with_values({"timing.timeout": 2.0, "timing.real_time_factor": 0.0})
         self._clock = AnsweredClock(shared.timing.period)
         with self._clock.of_new_nodes(shared.timing.mode):
-            self._composition = Composition(configuration, domain_id=domain_id)
+            self._composition = Composition(configuration, domain_id=domain_id, is_split=True)
         self.nodes: dict[str, Any] = dict(self._composition.nodes)
         self.driver = self.nodes["driver"].driver
         motors = shared.arm.motors
