@@ -14,13 +14,7 @@ from wam_description.signals import ForceCommand
 from wam_driver.loads import contact_force
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
-from wam_studies.force_benchmark.tasks import (
-    RANGES,
-    Task,
-    configured,
-    steps,
-    triple,
-)
+from wam_studies.force_benchmark.tasks import RANGES, Task, configured, steps, triple
 from wam_studies.force_benchmark.trial import TaskWatch
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact

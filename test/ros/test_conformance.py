@@ -110,9 +110,9 @@ def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_ref
 ) -> None:
     configuration = driver_alone(Configuration.load(packaged("barrett-wam7")))
     bench = Bench(ros, tmp_path, configuration)
+    ros.wait(lambda: max(map(abs, bench.probe.carrying)) > 0.6, what="A, in motor 4 at the start")
     found = [conformance_row(bench.probe, key, PATIENT) for key in ("refusals", "answers")]
     assert [row.text for row in found if row.verdict != OK] == []
-    assert max(map(abs, bench.probe.carrying)) > 0.6, "A, in motor 4"
 
 
 @pytest.mark.slow
@@ -164,12 +164,15 @@ def test_a_real_arm_stops_above_a_limit(ros: Network, tmp_path: Path, name: str,
     loaded = on_bus(Configuration.load(packaged("barrett-wam4-bus")), "simulated:200")
     driver = Bench(ros, tmp_path, driver_alone(loaded.with_values({name: limit}))).driver
 
-    def is_driven_on() -> bool:
+    def has_stopped() -> bool:
         driver.command(driver.stamp, [0.5, 0.0, 0.0, 0.0])
-        return not (driver.unready or driver.enable().success)
+        stopped = any(str(event.values.get("quantity", "")).startswith(quantity) for event in driver.safety.events)
+        if not (stopped or driver.unready):
+            driver.reset_fault()  # where a busy computer was late
+            driver.enable()
+        return stopped
 
-    ros.wait(is_driven_on)
-    assert driver.safety.events[0].values["quantity"].startswith(quantity)
+    ros.wait(has_stopped)
     assert not driver.hardware._cycle.is_released
 
 
