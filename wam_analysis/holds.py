@@ -116,7 +116,7 @@ def holds_of(
     for hold in sorted(long, key=lambda one: (one.begin, one.axis)):
         name = step_at(steps, (hold.begin + hold.end) // 2) or f"{hold.commanded:.3g} N"
         name += f", axis {hold.axis + 1}" * (hold.axis >= 0)
-        name = name if name not in holds else f"{name} ({hold.begin / 1e9:.1f} s)"
+        name = name if name not in holds else f"{name} at {hold.begin / 1e9:.1f} s"
         own = within(of_force_loop(reactions), hold.begin, hold.end)
         holds[name] = hold._replace(name=name, reactions=own)
     return tuple(holds.values())

@@ -274,13 +274,13 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
     here = list(own.guard.posture)
-    assert loop.report.facts["margin here, assessed"].startswith("at `worst case`, until")
+    assert loop.report.facts["pose of margin here"].startswith("at `worst case`, until")
     assert follow(loop, here) == 1.0
     assert loop.watch is not None
     assert loop.report.facts["margin here"].startswith(f"{loop.watch.scale:.4g}"), "also where the factor stays"
     factor = follow(loop, STIFF_POSE)
     assert factor < 0.75
-    assert loop.report.facts["margin here, assessed"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
+    assert loop.report.facts["pose of margin here"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
     assert f"all are multiplied by {factor:.3g}" in loop.report.message
     guard = StabilityGuard(ARM, SERVO, CLOCK, own.guard, own.sensing)
     task = loop_task(loop)
@@ -292,7 +292,7 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     assert follow(loop, here) == 1.0
     warned = Loop(guarded(own, mode="warn"))
     follow(warned, STIFF_POSE)
-    assert warned.report.facts["gain factor"] == "1"
+    assert warned.report.facts["gains multiplied by"] == "1"
 
 
 def test_gains_far_above_their_margin_are_followed_where_the_guard_only_warns() -> None:
@@ -301,7 +301,7 @@ def test_gains_far_above_their_margin_are_followed_where_the_guard_only_warns() 
     assert loop.assessment is not None
     assert 0.0 < loop.assessment.scale < 0.01
     assert follow(loop, own.guard.posture, force=(0.0, 1.0, 0.0)) == 0.0
-    assert loop.report.facts["gain factor"] == "1"
+    assert loop.report.facts["gains multiplied by"] == "1"
 
 
 def loop_task(loop: ForceLoop) -> GuardedTask:

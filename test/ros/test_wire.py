@@ -264,7 +264,7 @@ def test_a_trajectory_that_is_streamed_is_read_once() -> None:
 @pytest.mark.parametrize(
     "status",
     [
-        NodeStatus(Level.WARN, "domain I", "force_loop", connected=True, facts={"gain factor": "1", "worst case": ""}),
+        NodeStatus(Level.WARN, "domain I", "force_loop", connected=True, facts={"margin here": "1", "worst case": ""}),
         NodeStatus(Level.ERROR, "fault: x", "driver", mode="fault", fault="x", stamp=5_000_000),
         NodeStatus(Level.OK, "press", "scenario", step="press", stamp=1),
     ],

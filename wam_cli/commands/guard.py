@@ -20,7 +20,7 @@ PLANT = {  # option: what it is
     "gain": "integral gain G_I, rad/s per N m or m/s per N",
 }
 SERVO = "velocity_loop"
-LEFT_OUT = ("margin here", "margin here, assessed", "gain factor", "lowered", "domain", "gains")  # see the message
+LEFT_OUT = ("margin here", "pose of margin here", "gains multiplied by", "lowered", "domain", "gains")  # in the message
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -236,10 +236,10 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
         "domain": str(assessment.domain),
         "margin": margin_text(assessment.scale),
         "margin here": margin_text(here, watch.needed if watch.assessed else GUARD.largest_scale),
-        "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
+        "pose of margin here": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
         if watch.assessed
         else UNKNOWN,
-        "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
+        "gains multiplied by": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
         "lowered": lowered or "nothing",
         "worst case": assessment.where,
         "effective stiffness [N/m]": f"{assessment.stiffness:.4g}",
