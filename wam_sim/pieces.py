@@ -102,15 +102,10 @@ class FinishedPieces:
 
 
 def key_of(function: Callable[..., Any], given: Any) -> str:
-    """The key of the piece of a function and an input."""
-    name = f"{function.__module__}:{function.__qualname__}"
-    return hashlib.sha256(pickle.dumps((name, given, code_of(function)), protocol=5)).hexdigest()[:32]
-
-
-def code_of(function: Callable[..., Any]) -> str:
-    """Hash of the code that the results of a function depend on."""
-    source = inspect.getsourcefile(function)
-    return sources(Path(source).resolve() if source else None)
+    """The key of the piece of a function and an input: a hash of both and of the code that the result depends on."""
+    name, source = f"{function.__module__}:{function.__qualname__}", inspect.getsourcefile(function)
+    code = sources(Path(source).resolve() if source else None)
+    return hashlib.sha256(pickle.dumps((name, given, code), protocol=5)).hexdigest()[:32]
 
 
 @cache

@@ -4,7 +4,6 @@ A study is a frozen dataclass below `Study` with three pure methods; each field 
 an option.  `wam evaluate NAME` runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
 """
 
-import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -17,7 +16,7 @@ from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 
 from wam_description.configuration import Configuration
 from wam_sim.batch import Report, results
-from wam_sim.pieces import code_of
+from wam_sim.pieces import key_of
 from wam_studies.figures.panels import Panel
 from wam_studies.scores import Scores
 
@@ -145,7 +144,7 @@ def evaluate(
     """Run the cases of each seed; the other arguments are those of `wam_sim.batch.results`."""
     found = iter(results(study.run, [case for own in cases.values() for case in own], executor, file, report))
     records = {seed: list(islice(found, len(own))) for seed, own in cases.items()}
-    code = hashlib.sha256(f"{code_of(study.run)} {study.configuration.text}".encode()).hexdigest()[:12]
+    code = key_of(study.run, study.configuration.text)[:12]
     return Measurement(study, records, f"{datetime.now(UTC):%Y-%m-%d}", code)
 
 
