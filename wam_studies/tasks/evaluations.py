@@ -70,8 +70,8 @@ def sweeping(runs: Runs) -> Result:
     calm = max(float(np.linalg.norm(trace.velocity[-1])) for trace in swept.values())
     rows = [
         Comparison("objects that move with the link", float(len(objects)), float(moved), "", 0.0, "all"),
-        noted("angle about the base over all objects, before", before, "rad"),
-        below("angle about the base over all objects, after / before", after / before, "", BOUNDS.together, "together"),
+        noted("angle the objects span at the base, before", before, "rad"),
+        below("angle the objects span at the base, after / before", after / before, "", BOUNDS.together, "together"),
         below("speed of the fastest object, after", calm, "m/s", 0.01, "at rest"),
         noted("largest true force of the arm", _largest(swept), "N"),
         *_estimate(run, sweep),
