@@ -205,7 +205,7 @@ def stiffness_rule(configuration: Configuration) -> dict[str, Array]:
     bandwidth, with_best = (force_resonances(rotor, link, k, contact, 1.0).lower * HZ for k in (cable, best))
     return {
         "k_tr, N m/rad": cable,
-        "k_c at the tip": contact,
+        f"k_c of {m.contact_stiffness:g} N/m at the tip": contact,
         "k_tr by (4.10)": best,
         "k_c by (4.9)": best_contact_stiffness(rotor, link, cable),
         "bandwidth, Hz": bandwidth,

@@ -231,7 +231,7 @@ def _dynamic_range(m: Measures) -> list[Requisite]:
         ),
         _row(
             name,
-            "steady force / largest stiction cycle (5.8) of the joints alone, force feedback",
+            "steady force / largest stiction cycle (5.8), force feedback, friction of the joints only",
             m.steady_force / m.cycle_force if m.cycle_force else math.inf,
             "",
             source="3.2.1",
