@@ -202,4 +202,4 @@ def _torque() -> Panel:
         line = RATIO / np.abs(force_transfer(1j * frequency, *own))
         measured = RATIO / force_amplitude(arm, some)
         lines.append((label, Series(HZ * frequency, line, HZ * some, measured)))
-    return Panel("c) torque for one force (4.3)", "frequency [Hz]", "motor torque over that at rest [-]", lines, "y")
+    return Panel("c) torque for equal force (4.3)", "frequency [Hz]", "motor torque over that at rest [-]", lines, "y")

@@ -128,7 +128,7 @@ def _attenuation() -> Panel:
         )
         for name, gain in gains.items()
     ]
-    title = "a) disturbance at the motor, half of the largest gain"
+    title = "a) disturbance at the motor"
     return Panel(title, "frequency [Hz]", "part that reaches the contact [-]", lines, "xy")
 
 
