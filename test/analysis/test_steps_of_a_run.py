@@ -507,7 +507,7 @@ def test_good_run_has_a_good_verdict():
     summary = Played().summary()
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | correct link: YES (98 % of contact time, required: 50 %) | "
-        "position within 4 cm: YES (2.0 cm), not known for contact 2 (inner_link) | "
+        "position within 4 cm: YES (2.0 cm), contact 2 (inner_link) not evaluated: position unknown | "
         f"at most 10 % false contact: YES (1.4 % of the time without contact) | {NO_LIMIT}"
     )
 
@@ -584,7 +584,7 @@ def test_a_position_known_for_a_moment_is_not_that_of_the_whole_contact():
     assert math.isnan(found.position)
     assert math.isnan(found.position_sd)
     assert found.is_lower_bound
-    assert "YES (2.0 cm), not known for contact 1 (outer_link), 2 (inner_link)" in verdict(summary)
+    assert "YES (2.0 cm), contact 1 (outer_link), 2 (inner_link) not evaluated: position unknown" in verdict(summary)
     recording.set(recording.estimated, 0.52, 1.2, "outer_link", (0.0, 11.0, 0.0), 0.30)  # two thirds of it
     assert recording.summary().contacts[0].position == pytest.approx(0.30)
 

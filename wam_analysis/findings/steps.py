@@ -196,7 +196,7 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
     unknown = [f"{number} ({one.link})" for number, one in found if one.is_lower_bound]
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{} cm")
-    return answer._replace(remark=f"not known for contact {', '.join(unknown)}" * bool(unknown))
+    return answer._replace(remark=f"contact {', '.join(unknown)} not evaluated: position unknown" * bool(unknown))
 
 
 def _false_verdict(traces: Traces) -> VerdictAnswer:
