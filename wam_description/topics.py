@@ -243,7 +243,7 @@ TOPICS: Final = (
         "joint_trajectory",
         TRAJECTORY,
         "outer",
-        "postures to go through, rad, streamed by your program in place of `joint_posture_command`",
+        "a whole path, rad, in place of `joint_posture_command`; your program repeats it: see docs/ros.md",
         "joints",
     ),
     _joints(

@@ -20,7 +20,7 @@ class InferenceParameters:
         "relative frequency of contacts at the ends of two links where they meet, for each of the two links", high=1e3
     )
     along_weight: float = parameter(
-        "relative frequency of forces along the last link: on its surface, and on its end",
+        "relative frequency of forces along the last link on its surface; the same on its end",
         high=1e3,
     )
     payload_weight: float = parameter(

@@ -45,7 +45,9 @@ class ObserverParameters:
         "sd of the friction of a slow shaft, as a fraction of static friction",
         high=10.0,
     )
-    payload_uncertainty: float = parameter("sd of the mass at the tool where no payload is declared", "kg", high=50.0)
+    payload_uncertainty: float = parameter(
+        "without joint sensors and with payload 0: sd of the mass at the tool", "kg", high=50.0
+    )
     drift: float = parameter("random drift of these model errors in one second, as a fraction of their sd", high=10.0)
     rest_uncertainty: float = parameter(
         "sd of the friction of a shaft at rest, as a fraction of static friction", high=10.0

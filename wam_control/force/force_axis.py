@@ -41,9 +41,7 @@ class SensingParameters:
         "as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True
     )
     estimated_torque_fraction: float = parameter(
-        "as torque_fraction, with feedback contact_estimate: torque constants and friction of the motors",
-        high=1.0,
-        live=True,
+        "as torque_fraction, with feedback contact_estimate", high=1.0, live=True
     )
     friction: float = parameter(
         "sd of the tangential force on the link, as a fraction of the commanded force", high=2.0, live=True
