@@ -196,8 +196,8 @@ def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: P
     run = pressing_run(tmp_path, ("actuator-limit-cycle", 0), time, force, steps, 21.9, **topics)
     result = limit_cycles.actuator({"press": run})
     rows = {row.quantity: row for row in result.rows}
-    assert rows["motor at the joint, peak to peak"].measured == pytest.approx(swing, rel=1e-3)
-    assert rows["motor at the joint, peak to peak"].predicted == pytest.approx(12.0 / stiffness, rel=1e-3)
+    assert rows["motor, as a joint angle, peak to peak"].measured == pytest.approx(swing, rel=1e-3)
+    assert rows["motor, as a joint angle, peak to peak"].predicted == pytest.approx(12.0 / stiffness, rel=1e-3)
     work = 0.5 * stiffness * (0.5 * swing) ** 2
     assert rows["work of a half cycle"].measured == pytest.approx(work, rel=5e-3)
     (power,) = (row for name, row in rows.items() if name.startswith("power"))

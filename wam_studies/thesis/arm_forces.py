@@ -143,7 +143,7 @@ def pushed(runs: Runs) -> Result:
     rows = [
         below("time of false detections", analysed.traces.false_seconds, "s", BOUNDS.latency, "chapter 2"),
         below("detection latency", found.latency, "s", BOUNDS.latency, "chapter 2"),
-        near(f"detection on {push.link}, part of its time", 1.0, push.right, "", "chapter 2", BOUNDS.wrong_link),
+        near("time with the correct link", 1.0, push.right, "fraction of the push", "chapter 2", BOUNDS.wrong_link),
         near("force, median", *force, "N", "chapter 2", BOUNDS.push_in_motion),
         Comparison("position, median", *place, "m", BOUNDS.position, "chapter 2", True),
     ]

@@ -79,7 +79,7 @@ def actuator(runs: Runs) -> Result:
     by_law = float(actuator_cycle_work(*friction)), float(actuator_cycle_power(link.loop.gain, error, friction[0]))
     swing = actuator_cycle(*friction, link.gamma, link.zeta)
     rows = [
-        near("motor at the joint, peak to peak", swing, found.peak_to_peak, "rad", "(5.20)"),
+        near("motor, as a joint angle, peak to peak", swing, found.peak_to_peak, "rad", "(5.20)"),
         near("work of a half cycle", by_law[0], work, "N m", "(5.21)"),
         near(f"power of a half cycle of {half:.2f} s", by_law[1], power, "W", "(5.22)", 0.05),
         below("contact force, remaining error", abs(shown.force[-1] - desired), "N", BOUNDS.within * desired),
