@@ -7,6 +7,7 @@ import numpy as np
 
 from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contacts, true_contacts
 from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theory_of
+from wam_analysis.findings.prediction import admitted
 from wam_analysis.findings.transmission import TransmissionFriction, transmission_friction
 from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.sources import Source, alternates, shared_parts, sources
@@ -202,9 +203,14 @@ class AnalysedRecording:
     def theories(self) -> dict[str, Theory]:
         """What is predicted for each of them, by name; nothing where it was refused."""
         return {
-            one.hold.name: Theory() if one.hold.is_refused else theory_of(self.run, self.parameters, one)
+            one.hold.name: Theory() if one.hold.is_refused else theory_of(self.run, self.admitted[0], one)
             for one in self.held
         }
+
+    @cached_property
+    def admitted(self) -> tuple[PredictionParameters, str]:
+        """As `wam_analysis.findings.prediction.admitted`."""
+        return admitted(self.parameters)
 
     @property
     def unassessed(self) -> tuple[list[RecordedStep], str]:

@@ -242,7 +242,7 @@ class AdaptedNode(StackNode):
         """As that of rclpy; the reason of a success states what applies where the node has lowered something."""
         result = super().set_parameters_atomically(parameter_list)
         if result.successful and (lowered := getattr(self.node, "lowered", "")):
-            result.reason = f"not stable, so the guard lowered it; now: {lowered}"
+            result.reason = f"lowered by the guard to be stable: {lowered}"
         return result
 
     def _take_refusal(self, refusal: str) -> None:

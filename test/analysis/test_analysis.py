@@ -20,7 +20,7 @@ from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
 from wam_analysis.findings.charts import charts
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.page import page
-from wam_analysis.findings.prediction import PressedPoint, guarded, largest_force, node_at
+from wam_analysis.findings.prediction import PressedPoint, admitted, guarded, largest_force, node_at
 from wam_analysis.findings.text import SCHEMA, json_text, text
 from wam_analysis.findings.transmission import CABLE, TransmissionSignals, _unrecorded
 from wam_analysis.foreign.topic_map import TopicMap
@@ -339,6 +339,18 @@ def test_the_verdict_on_a_press_is_that_of_the_guard(moving: Recorded) -> None:
         else:
             with pytest.raises(ParameterError, match=r"times the largest linearly stable"):
                 ForceLoop(recorded_set.arm, recorded_set.servo, loop, recorded_set.timing)
+
+
+@pytest.mark.slow
+def test_predictions_are_for_the_gains_that_the_guard_admitted(moving: Recorded) -> None:
+    given = prediction_parameters(recorded_parameters(moving.bag, "/wam"))
+    arm, servo, timing, own = given.arm, given.servo, given.timing, given.force_loop
+    assert arm is not None and servo is not None and timing is not None and own is not None  # noqa: PT018 - for mypy
+    high = replace(own, force_gain=(2.0,))
+    loop = ForceLoop(arm, servo, high, timing)
+    assert loop.lowered.startswith("force_gain [0.")
+    assert admitted(given._replace(force_loop=high)) == (given._replace(force_loop=loop.parameters), loop.lowered)
+    assert admitted(given) == (given, "")
 
 
 def test_the_largest_force_of_the_testbed_is_peak_torque_over_the_lever() -> None:

@@ -483,6 +483,24 @@ def test_a_failed_task_leaves_a_report(tmp_path, capsys):
 
 
 @pytest.mark.slow
+def test_a_gain_that_the_guard_lowered_is_reported_as_it_was_just_after_the_change(tmp_path):
+    steps = [
+        {"name": "enable", "seconds": 0.1, "request": "enable"},
+        {"name": "give", "seconds": 0.6, "set": {"force_loop": {"force_gain": [0.5]}}, "posture": POSE},
+        {"name": "give more", "seconds": 0.1, "set": {"force_loop": {"limits.doubt": 2.0}}},
+    ]
+    script, bag = tmp_path / "script.yaml", tmp_path / "bag"
+    script.write_text(json.dumps({"steps": steps}))
+    configuration = Configuration.load(packaged("wam"))
+    assert record(configuration, load_steps(script, configuration.shared), bag) == ""
+    found = analyse_steps(bag)
+    statuses = found.recording.run.statuses
+    lowered = list(dict.fromkeys(status.facts["lowered"] for status in statuses if "lowered" in status.facts))
+    assert len(lowered) == 3, "nothing, and a gain in each pose"
+    assert f"to [0.5] at 0.10 s, lowered by the guard to {lowered[1]}, " in " ".join(analysis_text(found).split())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_during_the_report_of_a_demo_leaves_where_the_recording_is_and_how_to_report_it(number):
     """The signal comes where the report begins, as it imports its modules."""

@@ -51,11 +51,7 @@ def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> N
 
 
 def played(
-    random: np.random.Generator,
-    stays: float,
-    moves: bool = True,
-    count: int = 7,
-    slides: float = 0.0,
+    random: np.random.Generator, stays: float, moves: bool = True, count: int = 7, slides: float = 0.0
 ) -> tuple[list[Hypothesis], ContactFusion]:
     """The best explanation at each moment of a push, whose torques err by a part that stays and one that changes."""
     inference = ContactInference(WAM, RigidBody(WAM), SMOOTH)

@@ -40,11 +40,7 @@ def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simula
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("q", "newtons"),
-    [
-        ((0.0, -1.0, 0.0, math.pi / 2.0 - 0.2), 15.0),
-        ((-2.2, -1.03, 1.34, 0.7), 15.0),
-    ],
+    ("q", "newtons"), [((0.0, -1.0, 0.0, math.pi / 2.0 - 0.2), 15.0), ((-2.2, -1.03, 1.34, 0.7), 15.0)]
 )
 def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...], newtons: float) -> None:
     """Near a straight elbow a force along the arm turned the joints back and forth by 3.9 to 5 rad/s."""
@@ -64,10 +60,7 @@ def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("q", "place", "newtons"),
-    [
-        ((0.0, -1.5, 0.0, 1.3), 0.4064, (10.0, 0.0, 0.0)),
-        ((-0.34, -1.08, -2.46, 2.17), 0.4, (27.6, -7.9, 4.9)),
-    ],
+    [((0.0, -1.5, 0.0, 1.3), 0.4064, (10.0, 0.0, 0.0)), ((-0.34, -1.08, -2.46, 2.17), 0.4, (27.6, -7.9, 4.9))],
 )
 def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
     q: tuple[float, ...], place: float, newtons: tuple[float, ...]

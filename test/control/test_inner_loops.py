@@ -49,11 +49,7 @@ def test_dynamics_between_motor_and_sensor_limit_the_torque_loop_and_not_the_vel
     assert ratios[0] < 0.3
     assert ratios[1] == pytest.approx(1.0, abs=0.05)
     arm = damped_testbed()
-    bare = replace(
-        arm,
-        cables=replace(arm.cables, damping=(0.0,)),
-        motors=replace(arm.motors, viscous_friction=(0.0,)),
-    )
+    bare = replace(arm, cables=replace(arm.cables, damping=(0.0,)), motors=replace(arm.motors, viscous_friction=(0.0,)))
     assert largest_gain(period_map(bare), torque.gain(bare)) < 0.05 * largest_gain(period_map(arm), torque.gain(arm))
 
 

@@ -239,10 +239,7 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         ({**WHOLE, "seconds": math.nan}, "seconds is nan; it must be a finite number"),
         ({**WHOLE, "posture": [0.0] * 3}, r"posture is \[0.0, 0.0, 0.0\]; it must be a list of 4 numbers"),
         ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
-        (
-            {**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]},
-            "posture: joint2 is commanded to -9 rad; allowed: -2.356 to",
-        ),
+        ({**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]}, "posture: joint2 is commanded to -9 rad; allowed: -2.356 to"),
         ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
         ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable, tare"),
         ({**WHOLE, "force": 5.0}, "force is 5.0; it must be a mapping with frame, newtons"),

@@ -31,12 +31,7 @@ def frame(twist: float, length: float, offset: float, angle: float) -> Array:
     """Frame i in frame i-1 as a (4, 4) matrix, printed (A.4)."""
     c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(twist), np.sin(twist)
     return np.array(
-        [
-            [c, -s, 0, length],
-            [s * ca, c * ca, -sa, -sa * offset],
-            [s * sa, c * sa, ca, ca * offset],
-            [0, 0, 0, 1],
-        ]
+        [[c, -s, 0, length], [s * ca, c * ca, -sa, -sa * offset], [s * sa, c * sa, ca, ca * offset], [0, 0, 0, 1]]
     )
 
 

@@ -64,10 +64,7 @@ class Rig:
     """An arm, its simulated bus and the driver; the arm is carried by the torques of its links."""
 
     def __init__(
-        self,
-        name: str = "barrett-wam4",
-        version: int = NEW,
-        via: Callable[[SimulatedBus], Line] = lambda bus: bus,
+        self, name: str = "barrett-wam4", version: int = NEW, via: Callable[[SimulatedBus], Line] = lambda bus: bus
     ) -> None:
         self.shared, own, self.plant = loaded(name)
         self.plant.reset()

@@ -71,7 +71,7 @@ def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
     assert (code, out) == (1, "")
     assert "posture_gain" in err
     assert called("get", "force_loop:posture_gain")[1] == "1.25\n"
-    told = "force_loop:force_gain=[0.5]; not stable, so the guard lowered it; now: force_gain [0.0"
+    told = "force_loop:force_gain=[0.5]; lowered by the guard to be stable: force_gain [0.0"
     assert called("set", "force_loop:force_gain=0.5")[1].startswith(told)
     assert called("set", "force_loop:force_gain=0.02")[1] == "force_loop:force_gain=[0.02]\n"
     wrong = "wam call: force_loop:force_gain is 'abc'; it must be a number\n"

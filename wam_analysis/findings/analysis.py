@@ -261,7 +261,8 @@ def _lowered(statuses: Sequence[tuple[int, NodeStatus]], key: str, begin: int, e
     """To what the guard lowered a parameter that had a value from one time to another, ns, '' where it did not."""
     node, _, name = key.partition(":")
     own = [status.facts for at, status in statuses if begin <= at < end and status.node == node]
-    text = next((facts["lowered"] for facts in reversed(own) if "lowered" in facts), "")
+    reported = next((i for i, facts in enumerate(own) if key in facts), -1)  # with what applied before
+    text = next((facts["lowered"] for facts in own[reported + 1 :] if "lowered" in facts), "")
     return f", lowered by the guard to {text}" * (name in text)
 
 

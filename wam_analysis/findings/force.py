@@ -198,6 +198,8 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         findings += _cycle_findings(one, theory)
     if not recording.held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
+    elif lowered := recording.admitted[1]:
+        sentences.append(f"At the start, the guard lowered parameters to stable values: {lowered}.")
     settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
     least = margin_text(min(margins, default=math.nan), digits=3)

@@ -17,7 +17,7 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers
 from wam_control.force.force_loop_parameters import force_law, task_of
-from wam_control.force.guard import margin_text
+from wam_control.force.guard import Supervision, margin_text
 from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
@@ -196,6 +196,18 @@ class Guarded(NamedTuple):
             f"Stability guard (sampled loop with its velocity loops, contact of {shown(self.surface)} N/m, "
             f"{self.posture}): domain {domain}, {stable} {margin_text(scale, digits=3)} times the gains at the start."
         )
+
+
+def admitted(recorded: PredictionParameters) -> tuple[PredictionParameters, str]:
+    """The parameters with the gains that the guard admitted at the start, and in words which of them it had lowered."""
+    arm, loop, timing, servo = recorded.arm, recorded.force_loop, recorded.timing, recorded.servo
+    if arm is None or loop is None or timing is None or servo is None or loop.guard.mode != "limit":
+        return recorded, ""
+    try:
+        found = Supervision(arm, servo, timing, loop, ())
+    except ParameterError:
+        return recorded, ""
+    return recorded._replace(force_loop=found.parameters), found.lowered
 
 
 def guarded(recorded: PredictionParameters, press: PressedPoint, surface: float) -> Guarded | None:
