@@ -229,7 +229,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, l
     if assessment.reason:
         message = f"not stable: {assessment.reason}"
     elif is_scaled:
-        message += f"; in this pose only smaller gains are stable, so all are multiplied by {watch.factor:.3g}"
+        message += f"; this pose needs smaller gains, so each is multiplied by {watch.factor:.3g}"
     cycle = assessment.cycle
     facts = {
         "guard.mode": mode,
