@@ -281,7 +281,7 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     factor = follow(loop, STIFF_POSE)
     assert factor < 0.75
     assert loop.report.facts["pose of margin here"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
-    assert f"all are multiplied by {factor:.3g}" in loop.report.message
+    assert f"each is multiplied by {factor:.3g}" in loop.report.message
     guard = StabilityGuard(ARM, SERVO, CLOCK, own.guard, own.sensing)
     task = loop_task(loop)
     touch = GuardedContact(STIFF_POSE, "outer_link", 0.28, UNSURE, normal(guard, STIFF_POSE), 6.0)
