@@ -44,6 +44,14 @@ class PredictionParameters(NamedTuple):
     servo: Servo | None
     note: str
 
+    @property
+    def of_force_loop(self) -> tuple[Arm, Servo, Timing, ForceLoopParameters] | None:
+        """What the force loop is made from, where the bag has all of it."""
+        arm, servo, timing, loop = self.arm, self.servo, self.timing, self.force_loop
+        if arm is None or servo is None or timing is None or loop is None:
+            return None
+        return arm, servo, timing, loop
+
 
 def prediction_parameters(recorded: RecordedParameters) -> PredictionParameters:
     """Everything that predictions need, as far as the bag has it."""

@@ -202,8 +202,9 @@ class AnalysedRecording:
     @cached_property
     def theories(self) -> dict[str, Theory]:
         """What is predicted for each of them, by name; nothing where it was refused."""
+        parameters, _ = self.admitted
         return {
-            one.hold.name: Theory() if one.hold.is_refused else theory_of(self.run, self.admitted[0], one)
+            one.hold.name: Theory() if one.hold.is_refused else theory_of(self.run, parameters, one)
             for one in self.held
         }
 

@@ -34,10 +34,6 @@ class MessageBus:
 
         return publish
 
-    def publish(self, topic: str, stamp: Any, value: Any) -> None:
-        """Publish one value of a stamp, ns."""
-        self.publisher(topic)(stamp, value)
-
 
 class QueuedBus(MessageBus):
     """Hands messages on in the order in which they were published, some of them in each turn of an executor.

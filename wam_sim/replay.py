@@ -249,8 +249,9 @@ def _run(
     bus = NodeBus({name: interface.topics[name] for name in declaration.outputs if name in interface.topics})
     bus.connect(declaration, feeds, interface.checks(declaration))
     recorded = [interface.topics[topic] for topic in feeds if topic not in declaration.outputs]
+    publishers = {topic.name: bus.publisher(topic.name) for topic in recorded}
     for _, topic, stamp, value in _messages(bag, namespace, recorded, shared):
-        bus.publish(topic, stamp, value)
+        publishers[topic](stamp, value)
     return bus.rows
 
 

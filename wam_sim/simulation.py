@@ -74,8 +74,8 @@ class Simulation:
         self._bus = NodeBus(self._interface.topics)
         self._bus.listen("motor_current_command", self._command)
         self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
-        self._publish = self._bus.publish
-        self._publish_states = self._bus.publisher("motor_states")
+        self._publishers = {topic: self._bus.publisher(topic) for topic in self._interface.topics}
+        self._publish_states = self._publishers["motor_states"]
         self._currents: tuple[int, list[float]] = (0, [])
         self._reported: tuple[Mode, tuple[Event, ...]] | None = None
         self._warned: dict[str, set[tuple[Any, ...]]] = {}  # of each node, what its last status was about
@@ -93,8 +93,7 @@ class Simulation:
             elif name != "driver":
                 self._connect(declaration, configuration, shared)
         self._motors = len(shared.arm.motors.names)
-        has_sensors = "joint_sensors" in self._interface.topics
-        self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
+        self._publish_sensors = self._publishers.get("joint_sensors")
         if FORCE_LOOP in self.nodes:
             self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
@@ -190,7 +189,7 @@ class Simulation:
         driver, stamp = self.driver, self.driver.stamp
         if driver.is_outer:
             for topic, value in driver.outer_values().items():
-                self._publish(topic, stamp, value)
+                self._publishers[topic](stamp, value)
         if self._publish_sensors is not None:
             self._publish_sensors(stamp, driver.joint_sensors)
         self._publish_states(stamp, driver.motor_state)

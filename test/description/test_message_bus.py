@@ -8,16 +8,16 @@ from wam_description.message_bus import MessageBus, QueuedBus
 
 def echoes(bus: MessageBus, count: int) -> list[str]:
     """What two listeners of a topic note of so many pings, each of which one of them answers with the next."""
-    seen: list[str] = []
+    seen, publish = list[str](), bus.publisher("/ping")
 
     def answer(stamp: int, value: str) -> None:
         seen.append(f"first {value}{stamp}")
         if stamp < count:
-            bus.publish("/ping", stamp + 1, value)
+            publish(stamp + 1, value)
 
     bus.listen("/ping", answer)
     bus.listen("/ping", lambda stamp, value: seen.append(f"second {value}{stamp}"))
-    bus.publish("/ping", 1, "p")
+    publish(1, "p")
     return seen
 
 

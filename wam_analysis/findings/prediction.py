@@ -200,11 +200,11 @@ class Guarded(NamedTuple):
 
 def admitted(recorded: PredictionParameters) -> tuple[PredictionParameters, str]:
     """The parameters with the gains that the guard admitted at the start, and in words which of them it had lowered."""
-    arm, loop, timing, servo = recorded.arm, recorded.force_loop, recorded.timing, recorded.servo
-    if arm is None or loop is None or timing is None or servo is None or loop.guard.mode != "limit":
+    own = recorded.of_force_loop
+    if own is None or own[-1].guard.mode != "limit":
         return recorded, ""
     try:
-        found = Supervision(arm, servo, timing, loop, ())
+        found = Supervision(*own, ())
     except ParameterError:
         return recorded, ""
     return recorded._replace(force_loop=found.parameters), found.lowered
@@ -217,9 +217,10 @@ def guarded(recorded: PredictionParameters, press: PressedPoint, surface: float)
     ----------
     surface : stiffness of what is pressed, N/m; NaN takes that of the guard's parameters.
     """
-    arm, loop, timing, servo = recorded.arm, recorded.force_loop, recorded.timing, recorded.servo
-    if arm is None or loop is None or timing is None or servo is None or loop.mode != "hybrid":
+    own = recorded.of_force_loop
+    if own is None or own[-1].mode != "hybrid":
         return None
+    arm, servo, timing, loop = own
     parameters = loop.guard
     if math.isfinite(surface):
         parameters = replace(parameters, contact_stiffness=surface)
