@@ -139,7 +139,7 @@ class FrictionParameters:
     joint_presliding_stiffness: tuple[float, ...] = parameter("the same for each joint", "N m/rad", is_common=True)
     warm_drop: float = parameter(
         "fraction by which the dry friction of a motor is smaller when its winding is at the thermal limit; "
-        "proportionally less with less heat; 0: friction does not depend on temperature",
+        "proportionally less with less heat. 0: friction does not depend on temperature",
         high=0.9,
         default=0.0,
     )
