@@ -126,7 +126,7 @@ class AnalysedRecording:
     @property
     def steps(self) -> tuple[RecordedStep, ...]:
         """Steps of the scenario, with the one in which the recording ends."""
-        return self.run.steps if self.run.unfinished is None else (*self.run.steps, self.run.unfinished)
+        return self.run.begun
 
     @property
     def outcome(self) -> str:

@@ -10,8 +10,8 @@ _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, i
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
-def load(text: str | bytes) -> Any:
-    """Values of a YAML text.
+def load(text: str | bytes, longest: int = READING_LIMITS.yaml_length) -> Any:
+    """Values of a YAML text of at most `longest` bytes.
 
     Raises
     ------
@@ -21,8 +21,8 @@ def load(text: str | bytes) -> Any:
     UnicodeDecodeError
         if it is not UTF-8.
     """
-    if len(text) > READING_LIMITS.yaml_length:
-        raise yaml.YAMLError(f"it has {len(text)} bytes; at most {READING_LIMITS.yaml_length} are read")
+    if len(text) > longest:
+        raise yaml.YAMLError(f"it has {len(text)} bytes; at most {longest} are read")
     text = text.decode() if isinstance(text, bytes) else text
     depth = 0
     for event in yaml.parse(text, Loader=_LOADER):

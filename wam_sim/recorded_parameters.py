@@ -125,7 +125,7 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
     if attached is None:
         return RecordedParameters(str(bag.path), {}, "", f"no {ATTACHMENT} in the bag", ())
     try:
-        tree = untrusted_yaml(attached)
+        tree = safe_yaml.load(attached, LARGEST)
         if not isinstance(tree, dict):
             raise ValueError("it has no sections")
         recorded = {
@@ -136,7 +136,7 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
         if tree and not recorded:
             there = ", ".join(sorted({str(name).rpartition("/")[0] for name in tree}))
             problem = f"{ATTACHMENT} in the bag has no parameters of the arm {namespace}; it has those of {there}"
-    except (ValueError, TypeError, LookupError, AttributeError) as error:
+    except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
         problem = f"{ATTACHMENT} in the bag cannot be read: {' '.join(str(error).split())}"
     differing = {node: _differences(node, values) for node, values in recorded.items()}
     words = "misses the parameters", "has the unknown parameters"
@@ -181,19 +181,3 @@ def _note(begin: str, names: Mapping[str, tuple[str, ...]]) -> str:
             of.setdefault(name, []).append(node)
     listed = ", ".join(name if len(nodes) > 1 else f"{nodes[0]}:{name}" for name, nodes in of.items())
     return f"{begin} {listed}" if listed else ""
-
-
-def untrusted_yaml(text: bytes | str) -> Any:
-    """The content of a YAML text of unknown origin.
-
-    Raises
-    ------
-    ValueError
-        if it is too large, too deep or no YAML, or has aliases, by which a short text can become any length.
-    """
-    if len(text) > LARGEST:
-        raise ValueError(f"it has {len(text)} bytes; at most {LARGEST} are read")
-    try:
-        return safe_yaml.load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(str(error)) from None

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+import yaml
 
+from wam_bag import safe_yaml
 from wam_bag.arrays import Mask, Times
-from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
+from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.signals import NodeStatus
@@ -17,7 +19,7 @@ from wam_description.status import CHANGES, ENABLED, parse
 from wam_description.topics import TOPICS
 from wam_sim.reactions import RecordedReaction, lasting
 from wam_sim.recorded_commands import RefusedCommands, several_runs, taken_commands
-from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
+from wam_sim.recorded_parameters import LARGEST, RecordedParameters, recorded_parameters
 
 Kind = TypeVar("Kind", JointColumns, WrenchColumns, PointColumns, TableColumns)
 
@@ -28,13 +30,6 @@ class RecordedStep(NamedTuple):
     name: str
     begin: int
     end: int
-    settings: Mapping[str, Any]
-
-
-class RecordedChange(NamedTuple):
-    """Live parameters that a node took after its step of a stamp, ns."""
-
-    after: int
     settings: Mapping[str, Any]
 
 
@@ -55,8 +50,7 @@ class RecordedRun(NamedTuple):
     arms : namespaces of all arms in the bag.
     parameters : of the arm's nodes.
     statuses : in the order of the bag.
-    steps : those that were played to their end.
-    unfinished : the step in which the recording ended, None if the scenario came to an end.
+    begun : the steps of the scenario; a recording without an outcome ended in the last one.
     outcome : `Code.DONE`, why the scenario failed, or '' if the recording ended before.
     faults : of the driver, each once.
     mode : 'lockstep', 'realtime' or 'unknown'.
@@ -68,8 +62,7 @@ class RecordedRun(NamedTuple):
     arms: tuple[str, ...]
     parameters: RecordedParameters
     statuses: tuple[NodeStatus, ...]
-    steps: tuple[RecordedStep, ...]
-    unfinished: RecordedStep | None
+    begun: tuple[RecordedStep, ...]
     outcome: str
     faults: tuple[RecordedFault, ...]
     mode: str
@@ -77,6 +70,11 @@ class RecordedRun(NamedTuple):
 
     def __repr__(self) -> str:
         return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r}, {self.mode})"
+
+    @property
+    def steps(self) -> tuple[RecordedStep, ...]:
+        """Those that were played to their end."""
+        return self.begun if self.outcome else self.begun[:-1]
 
     @property
     def is_simulated(self) -> bool:
@@ -98,21 +96,15 @@ class RecordedRun(NamedTuple):
         text = f"this is {self.namespace or '/'} alone; other arms in this bag: --namespace {' or '.join(others)}"
         return text if others else ""
 
-    def changes(self, node: str) -> list[RecordedChange]:
-        """Live parameters that a node took while it ran, by 'node:parameter', as it reported them itself."""
-        found: list[RecordedChange] = []
-        for status in self.statuses:
-            if status.node == node and CHANGES in status.facts:
-                if found and found[-1].after == status.stamp:  # the same, and more
-                    found.pop()
-                found.append(RecordedChange(status.stamp, _settings(status)))
-        return found
+    def changes(self, node: str) -> dict[int, Mapping[str, Any]]:
+        """Live parameters, by 'node:parameter', that a node reported to have taken after its step of a stamp, ns."""
+        # the last report of a stamp has all
+        return {one.stamp: _settings(one) for one in self.statuses if one.node == node and CHANGES in one.facts}
 
     def live_values(self, *nodes: str) -> list[tuple[int, Mapping[str, Any]]]:
         """Live parameters by 'node:parameter' and when they were set, ns, in order: by steps, and by these nodes."""
-        steps = [*self.steps, *([self.unfinished] if self.unfinished else [])]
-        found = [(step.begin, step.settings) for step in steps]
-        found += [(change.after, change.settings) for node in nodes for change in self.changes(node)]
+        found = [(step.begin, step.settings) for step in self.begun]
+        found += [change for node in nodes for change in self.changes(node).items()]
         return sorted(found, key=lambda one: one[0])
 
     def stamped_statuses(self) -> list[tuple[int, NodeStatus]]:
@@ -120,7 +112,7 @@ class RecordedRun(NamedTuple):
 
         That is one of a joint state or of another status: of a part of a recording only statuses are from before it.
         """
-        columns, states = self.bag.topics.get(f"{self.namespace}/status"), self.joints("joint_states")
+        columns, states = self.columns("status"), self.joints("joint_states")
         if columns is None:
             return [(status.stamp, status) for status in self.statuses]
         logged = columns.log_time_ns.tolist()
@@ -165,8 +157,12 @@ class RecordedRun(NamedTuple):
     def lacking(self, *names: str) -> tuple[str, ...]:
         """Those of some topics that were not recorded; of what was refused that is known."""
         refused = {one.topic for one in self.refused}
-        found = {name: self.bag.topics.get(f"{self.namespace}/{name}") for name in names if name not in refused}
+        found = {name: self.columns(name) for name in names if name not in refused}
         return tuple(name for name, columns in found.items() if columns is None or not len(columns.log_time_ns))
+
+    def columns(self, topic: str) -> Columns | None:
+        """Columns of a topic of the arm, None if it was not recorded, or not read."""
+        return self.bag.topics.get(f"{self.namespace}/{topic}")
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
@@ -188,7 +184,7 @@ class RecordedRun(NamedTuple):
         name = f"{self.namespace}/{topic}"
         if name not in self.bag.topics and self.bag.counts.get(name):
             raise LookupError(f"{self.bag.path} has {name}, but it was not read; add it to the topics that are read")
-        columns = self.bag.topics.get(name)
+        columns = self.columns(topic)
         return columns if isinstance(columns, kind) and len(columns.stamp_ns) else None
 
     def messages(self, topic: str) -> Sequence[Any]:
@@ -224,7 +220,6 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
     bag, refused = taken_commands(bag, namespace, parameters)
     commands = bag.topics.get(f"{namespace}/force_command")
     last = int(commands.stamp_ns[-1]) if isinstance(commands, WrenchColumns) and len(commands.stamp_ns) else 0
-    steps, unfinished, outcome = _steps(statuses, last)
     faults = dict.fromkeys(RecordedFault(s.stamp, s.fault) for s in statuses if s.node == "driver" and s.fault)
     return RecordedRun(
         bag,
@@ -232,9 +227,7 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
         arms,
         parameters,
         statuses,
-        steps,
-        unfinished,
-        outcome,
+        *_steps(statuses, last),
         tuple(faults),
         bag.mode,
         refused,
@@ -264,8 +257,8 @@ def status_of(message: Any) -> NodeStatus:
     return parse(str(message.name).rpartition("/")[2], int(message.level), str(message.message), given)
 
 
-def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedStep, ...], RecordedStep | None, str]:
-    """Steps that ended, the one that did not, and the outcome.
+def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedStep, ...], str]:
+    """Steps that began, and the outcome.
 
     Parameters
     ----------
@@ -276,21 +269,18 @@ def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedSte
         if status.node != "scenario" or not status.stamp:
             continue
         if not status.step:
-            return tuple(_ended(begun, status.stamp)), None, status.message if status.level else Code.DONE.value
+            return _ended(begun, status.stamp), status.message if status.level else Code.DONE.value
         if begun and begun[-1][:2] == (status.step, status.stamp):  # published again with what it has set
             begun[-1] = begun[-1]._replace(settings={**begun[-1].settings, **_settings(status)})
         else:
             begun.append(RecordedStep(status.step, status.stamp, status.stamp, _settings(status)))
-    if not begun:
-        return (), None, ""
-    *steps, unfinished = _ended(begun, max(last, begun[-1].begin))
-    return tuple(steps), unfinished, ""
+    return _ended(begun, max([last, *(step.begin for step in begun[-1:])])), ""
 
 
-def _ended(begun: Sequence[RecordedStep], end: int) -> list[RecordedStep]:
+def _ended(begun: Sequence[RecordedStep], end: int) -> tuple[RecordedStep, ...]:
     """Each step with the start of the next one as its end, the last one with the end that is given, ns."""
     ends = [*(step.begin for step in begun[1:]), end]
-    return [step._replace(end=end) for step, end in zip(begun, ends, strict=False)]
+    return tuple(step._replace(end=end) for step, end in zip(begun, ends, strict=False))
 
 
 def _settings(status: NodeStatus) -> dict[str, Any]:
@@ -304,7 +294,7 @@ def _value(text: str) -> Any:
     except (ValueError, RecursionError):
         pass
     try:
-        found = untrusted_yaml(text)
-    except ValueError:
+        found = safe_yaml.load(text, LARGEST)
+    except (yaml.YAMLError, ValueError):
         return text
     return text if isinstance(found, bool) and text not in ("True", "False") else found  # 'off' is a word

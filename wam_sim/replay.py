@@ -15,7 +15,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.defects import owners
@@ -26,7 +26,7 @@ from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Inputs, Outputs
-from wam_sim.bus import NodeBus, TopicValue, flat
+from wam_sim.bus import NodeBus, Rows, TopicValue, flat
 from wam_sim.recorded_run import RecordedRun, recorded_run
 
 # fields of messages with three axes, and their units
@@ -65,13 +65,6 @@ class Compared(NamedTuple):
     def is_same(self) -> bool:
         """Whether there is no difference at all."""
         return not (self.only_recorded or self.only_replayed or self.different)
-
-
-class Change(NamedTuple):
-    """Parameters that a node takes after its step of a stamp, ns."""
-
-    after: int
-    parameters: Any
 
 
 class ChangedValue(NamedTuple):
@@ -141,22 +134,18 @@ def replay(
     inputs = [topic for topic in declaration.inputs if rows[topic].is_replayed]
     bag = read(path, [*inputs, *outputs, STATUS], may_lack=True)
     run = recorded_run(bag, namespace)
-    run = run._replace(parameters=run.parameters.with_options(values))
-    namespace = run.namespace
-    _require_types(bag, namespace, [rows[topic] for topic in (*inputs, *outputs)])
+    # the node gets all that was sent, also what it refused
+    run = run._replace(bag=bag, parameters=run.parameters.with_options(values))
+    _require_types(run, [rows[topic] for topic in (*inputs, *outputs)])
     triggers = (reaction.trigger.topic for reaction in declaration.reactions)
-    if missing := next((trigger for trigger in triggers if f"{namespace}/{trigger}" not in bag.topics), ""):
+    if missing := next((trigger for trigger in triggers if run.columns(trigger) is None), ""):
         raise BagError(f"{path} lacks the topic {missing}, without which {declaration.name} does nothing")
     shared, own = _parameters(run, declaration, configuration)
-    present = (
-        configuration.sections.get(declaration.name, {}) if configuration else run.parameters.nodes[declaration.name]
-    )
-    changes = _changes(run, declaration, present)
-    published = _run(bag, namespace, shared, declaration, own, changes)
+    published = _run(run, shared, declaration, own)
     compared = []
     for topic in map(rows.__getitem__, outputs):
-        columns = bag.topics.get(f"{namespace}/{topic.name}")
-        compared.append(_compare(topic, columns, published.get(topic.name, []), owners(topic, shared.arm)))
+        columns, names = run.columns(topic.name), owners(topic, shared.arm)
+        compared.append(_compare(topic, columns, published.get(topic.name, []), names))
     if not any(one.compared or one.only_recorded or one.only_replayed for one in compared):
         raise BagError(
             f"{path}: {declaration.name} publishes nothing from these inputs, and the bag has no message of it: "
@@ -168,13 +157,13 @@ def replay(
     return Replay(declaration.name, mode, tuple(compared), tuple(lost), changed, run.others)
 
 
-def _require_types(bag: Bag, namespace: str, topics: Sequence[Topic]) -> None:
+def _require_types(run: RecordedRun, topics: Sequence[Topic]) -> None:
     """Refuse a bag in which a topic has another type than now: it would be missing without a word."""
     for topic in topics:
-        name = f"{namespace}/{topic.name}"
-        if (recorded := bag.types.get(name, topic.type)) != topic.type:
+        name = f"{run.namespace}/{topic.name}"
+        if (recorded := run.bag.types.get(name, topic.type)) != topic.type:
             raise BagError(
-                f"{bag.path}: {name} was recorded as {recorded}; this version has it as {topic.type}: replay "
+                f"{run.bag.path}: {name} was recorded as {recorded}; this version has it as {topic.type}: replay "
                 "the bag with the version that recorded it"
             )
 
@@ -207,37 +196,28 @@ def _changed_values(run: RecordedRun, declaration: Declaration, shared: Shared, 
     )
 
 
-def _changes(run: RecordedRun, declaration: Declaration, values: Mapping[str, Any]) -> list[Change]:
-    """What the node took while it ran, as it reported it or as a scenario set it."""
-    prefix, present, found = f"{declaration.name}:", dict(values), list[Change]()
-    reported = run.changes(declaration.name)
-    steps = () if reported else (*run.steps, *([run.unfinished] if run.unfinished else []))
-    given = [(one.after, one.settings) for one in reported] + [(step.begin - 1, step.settings) for step in steps]
-    for after, settings in given:
+def _changes(run: RecordedRun, node: str, own: Any) -> list[tuple[int, Any]]:
+    """Parameters that a node took, after its step of a stamp, ns, as it reported it or as a scenario set it."""
+    prefix, present, found = f"{node}:", values_of(own), list[tuple[int, Any]]()
+    for after, settings in run.changes(node).items() or [(step.begin - 1, step.settings) for step in run.begun]:
         mine = {key.removeprefix(prefix): value for key, value in settings.items() if key.startswith(prefix)}
         present |= mine
         if mine:
-            found.append(Change(after, build_part(declaration.parameter_class, present)))
+            found.append((after, build_part(type(own), present)))
     return found
 
 
-def _run(
-    bag: Bag,
-    namespace: str,
-    shared: Shared,
-    declaration: Declaration,
-    own: Any,
-    changes: list[Change],
-) -> dict[str, list[TopicValue]]:
+def _run(run: RecordedRun, shared: Shared, declaration: Declaration, own: Any) -> Rows:
+    changes = _changes(run, declaration.name, own)
     interface, node = Interface(shared, started_by_hand=declaration), declaration.make(shared, own)
     for item in (item for reaction in declaration.reactions for item in reaction.inputs):
-        if item.age == "command" and f"{namespace}/{item.topic}" not in bag.topics:
+        if item.age == "command" and run.columns(item.topic) is None:
             interface.topics.pop(item.topic, None)  # the scenario that was recorded did not have this command
 
     def changing(work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
         def step(inputs: Inputs) -> Outputs:
-            while changes and changes[0].after < inputs.stamp:
-                node.tune(changes.pop(0).parameters)
+            while changes and changes[0][0] < inputs.stamp:
+                node.tune(changes.pop(0)[1])
             return work(inputs)
 
         return step
@@ -250,17 +230,16 @@ def _run(
     bus.connect(declaration, feeds, interface.checks(declaration))
     recorded = [interface.topics[topic] for topic in feeds if topic not in declaration.outputs]
     publishers = {topic.name: bus.publisher(topic.name) for topic in recorded}
-    for _, topic, stamp, value in _messages(bag, namespace, recorded, shared):
+    for _, topic, stamp, value in _messages(run, recorded, shared):
         publishers[topic](stamp, value)
     return bus.rows
 
 
-def _messages(bag: Bag, namespace: str, inputs: Sequence[Topic], shared: Shared) -> list[tuple[int, str, int, Any]]:
+def _messages(run: RecordedRun, inputs: Sequence[Topic], shared: Shared) -> list[tuple[int, str, int, Any]]:
     """Log time, topic, stamp and value of every input in the order in which they came."""
     found: list[tuple[int, str, int, Any]] = []
     for topic in inputs:
-        columns = bag.topics.get(f"{namespace}/{topic.name}")
-        if columns is not None:
+        if (columns := run.columns(topic.name)) is not None:
             times = columns.log_time_ns.tolist()
             values = _values(columns, owners(topic, shared.arm))
             found += [(time, topic.name, *value) for time, value in zip(times, values, strict=True)]

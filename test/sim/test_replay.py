@@ -130,11 +130,11 @@ def test_gains_that_were_changed_at_any_time_replay_with_their_change(tmp_path: 
         assert [topic for topic in done.topics if not topic.is_same] == []
         assert done.lost == ()
     run = recorded_run(read(bag))
-    first, third, softer = run.changes("force_loop")
-    assert [value for _, value in sorted(first.settings.items())] == ["pinned", 3.3]
-    assert softer.settings == {"force_loop:posture_gain": 4.0}
-    assert third.settings == {"force_loop:posture_gain": 2.9, "force_loop:contact_source": "estimated"}
-    assert 0 < first.after < third.after
+    (begin, first), (later, third), (_, softer) = run.changes("force_loop").items()
+    assert [value for _, value in sorted(first.items())] == ["pinned", 3.3]
+    assert softer == {"force_loop:posture_gain": 4.0}
+    assert third == {"force_loop:posture_gain": 2.9, "force_loop:contact_source": "estimated"}
+    assert 0 < begin < later
     silent = without_messages(bag, tmp_path / "silent", "/wam/status", CHANGES.encode())
     assert not replay(silent, "force_loop").is_same, "as it was before the nodes reported what they took"
 

@@ -211,7 +211,7 @@ def recording(path: Path) -> Recording:
     steps = tuple(Step(step.name, step.begin / 1e9, step.end / 1e9, step.settings) for step in run.steps)
     begin = int(run.bag.metadata.get(CUT, {}).get("begin_ns", 0)) / 1e9
     stamp, fault = run.faults[0] if run.faults else (0, "")
-    outcome = run.unfinished.name if run.unfinished else run.outcome
+    outcome = run.outcome or next((step.name for step in run.begun[-1:]), "")
     fault_time = stamp / 1e9 if fault else float("nan")
     return Recording(run.bag, run.namespace, run.parameters, _whole(steps, begin), fault, fault_time, outcome)
 
