@@ -13,7 +13,6 @@ from wam_bag.losses import RECORDING
 from wam_bag.metadata import offered
 from wam_bag.value_messages import TIME, Encode, encoder
 from wam_control.task.scenario import ScenarioStep
-from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration
 from wam_description.defects import owners
 from wam_description.interface import Interface, declared
@@ -22,10 +21,9 @@ from wam_description.status import pairs
 from wam_description.topics import STATUS
 from wam_description.urdf import urdf
 from wam_description.yaml_text import parameter_text
-from wam_sim.simulation import Simulation
+from wam_sim.simulation import SCENARIO, Simulation
 
 DESCRIPTION: Final = "robot_description"
-PLAYER: Final = "scenario"  # the node
 
 
 def record(
@@ -59,13 +57,11 @@ def record(
     RecordingError
         if the bag cannot be written.
     """
-    if PLAYER not in configuration.shared.nodes:  # it is simulated in any case
-        configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, PLAYER]})
+    configuration = configuration.with_nodes(SCENARIO)  # it is simulated in any case
     simulation = Simulation(configuration, steps)
-    shared = configuration.shared
     with BagWriter(path) as bag:
-        recording = _Recording(bag, simulation, shared, namespace)
-        simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), PLAYER)
+        recording = _Recording(bag, simulation, namespace)
+        simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), SCENARIO)
         bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration, namespace).encode())
         recording.watch_driver()
         while not is_stopped() and not simulation.step():
@@ -79,7 +75,8 @@ def record(
 class _Recording:
     """Writes what a simulation publishes."""
 
-    def __init__(self, bag: BagWriter, simulation: Simulation, shared: Shared, namespace: str) -> None:
+    def __init__(self, bag: BagWriter, simulation: Simulation, namespace: str) -> None:
+        shared = simulation.configuration.shared
         self._bag, self._simulation, self._arm, self._namespace = bag, simulation, shared.arm, namespace
         self._counts: Counter[tuple[str, str]] = Counter()
         self._driver: NodeStatus | None = None

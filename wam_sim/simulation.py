@@ -12,11 +12,11 @@ from typing import Any
 from wam_control.contact.contact_estimator import ContactEstimate
 from wam_control.task.scenario import FORCE_LOOP, Scenario, ScenarioStep
 from wam_control.task.scenario_settings import require_settings
-from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.event import Event, Level
 from wam_description.event_text import news
 from wam_description.interface import Interface, require_sections
+from wam_description.message_bus import Take
 from wam_description.parameters import ParameterError, build, meant, require
 from wam_description.signals import NodeStatus, State
 from wam_description.synchroniser import Synchroniser
@@ -89,19 +89,19 @@ class Simulation:
             if name == SCENARIO:  # what it sets has to fit the other values of its node
                 scenario = Scenario(steps, shared, own)
                 require_settings("the scenario", [step.settings for step in scenario.steps], configuration, own)
-                self._connect(declaration, configuration, shared, scenario)
+                self._connect(declaration, scenario)
             elif name != "driver":
-                self._connect(declaration, configuration, shared)
+                self._connect(declaration)
         self._motors = len(shared.arm.motors.names)
         self._publish_sensors = self._publishers.get("joint_sensors")
         if FORCE_LOOP in self.nodes:
             self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
 
-    def _connect(self, declaration: Declaration, configuration: Configuration, shared: Shared, *more: Scenario) -> None:
-        name, kind = declaration.name, declaration.parameter_class
-        own = configuration.node(name, kind) if name in configuration.sections else build(kind, {})
-        node = self.nodes[name] = declaration.make(shared, own, *more)
+    def _connect(self, declaration: Declaration, *more: Scenario) -> None:
+        name, kind, given = declaration.name, declaration.parameter_class, self.configuration
+        own = given.node(name, kind) if name in given.sections else build(kind, {})
+        node = self.nodes[name] = declaration.make(given.shared, own, *more)
         feeds = self._interface.feeds(declaration, node)
         self._synchronisers[name] = {feed.synchroniser for found in feeds.values() for feed in found}
         if hasattr(node, "requests"):
@@ -168,7 +168,7 @@ class Simulation:
         message = f"{safety.mode.value}: {safety.fault}".removesuffix(": ")
         return NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault, events=safety.events)
 
-    def listen(self, topic: str, take: Callable[[int, Any], None], node: str = "") -> None:
+    def listen(self, topic: str, take: Take, node: str = "") -> None:
         """Call a function with stamp, ns, and value of each message of a topic; of one that all publish, of a node."""
         known = {*self._interface.topics, *EVERY_NODE}
         require(topic in known, f"no topic is named '{topic}'; {meant(topic, known)}topics: {', '.join(sorted(known))}")

@@ -20,7 +20,6 @@ from wam_sim.reactions import (
     BRIEF,
     SETTLING_TIME,
     STEADY,
-    PlayedStep,
     RecordedReaction,
     doubts,
     too_short,
@@ -156,18 +155,16 @@ def outcome(point: SweepPoint) -> SweepResult:
         return SweepResult(f"unexpected {raised(error)}")
     reactions, played = run.reactions, run.played
     others = [one for one in played if one.step.force == NO_FORCE]  # a force is measured, and named there if refused
-    found = [failure, *unmet_in_words(reactions, others)]
-    measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
-    brief = filter(None, (measured.unassessed, _unassessed(point.configuration, reactions, played)))
+    measured = _measured(run, [failure, *unmet_in_words(reactions, others)])
+    brief = filter(None, (measured.unassessed, _unassessed(run)))
     lowered = getattr(run.nodes.get(FORCE_LOOP), "lowered", "")
     reports = [f"the guard lowered it; used: {lowered}"] * bool(lowered)
     reports += [f"{one.name}: {why.name}" for one in played if one.step.commands_arm for why in doubts(reactions, one)]
     return measured._replace(unassessed="; ".join(dict.fromkeys(brief)), reported="; ".join(dict.fromkeys(reports)))
 
 
-def _measured(
-    run: Simulation, body: RigidBody, reactions: Sequence[RecordedReaction], failures: Sequence[str]
-) -> SweepResult:
+def _measured(run: Simulation, failures: Sequence[str]) -> SweepResult:
+    body, reactions = RigidBody(run.configuration.shared.arm), run.reactions
     truth = {row.stamp: row for row in run.rows.get("sim/contact/wrench", [])}
     joints = {row.stamp: row.values[: len(body.arm.joints.names)] for row in run.rows.get("sim/joint_states", [])}
     errors: list[float] = []
@@ -203,13 +200,12 @@ def _refusal(reactions: Sequence[RecordedReaction], begin: int, end: int) -> str
     return next((one.reason for one in reactions if one.holds and one.begin <= end and one.end > begin), "")
 
 
-def _unassessed(
-    configuration: Configuration, reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]
-) -> str:
+def _unassessed(run: Simulation) -> str:
     """Steps whose task commands a force, a torque or a motion too briefly to be assessed; '' where none was."""
-    if FORCE_LOOP not in configuration.shared.nodes:
+    if FORCE_LOOP not in run.configuration.shared.nodes:
         return ""
-    settling = [(0, configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time)]
+    played = run.played
+    settling = [(0, run.configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time)]
     settling += [
         (one.begin, setting.value)
         for one in played
@@ -217,7 +213,7 @@ def _unassessed(
         if (setting.node, setting.name) == (FORCE_LOOP, SETTLING_TIME) and isinstance(setting.value, (int, float))
     ]
     times = watched_times((one.step.task, one.begin, one.end) for one in played)
-    brief = unassessed(reactions, times, played, settling)
+    brief = unassessed(run.reactions, times, played, settling)
     return f"{', '.join(one.name for one in brief)}: {too_short(settling, brief)}" if brief else ""
 
 
