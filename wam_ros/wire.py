@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_bag import value_messages
-from wam_bag.cdr import first_stamp
+from wam_bag.cdr import Pattern, first_stamp
 from wam_bag.value_messages import Encode, joint_states, tables, wrenches
 from wam_description.arm import Arm, Shared
 from wam_description.defects import defect_finder, frames, owners
@@ -31,7 +31,6 @@ _STAMP_END = 12  # bytes to the end of the stamp of a message with a header
 
 MARKERS = "visualization_msgs/msg/MarkerArray"
 Decode = Callable[[bytes], Any]
-Numbers = list[Any]  # groups of them
 
 
 def stamp_in(data: bytes) -> int:
@@ -71,11 +70,16 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
 
     if topic.type == TRAJECTORY:
         return _repeated(slowly)
-    find, require_usable = _finder(topic, shared.arm), requirement(topic, shared, arrays)
+    known, require_usable = _known(topic, shared.arm), requirement(topic, shared, arrays)
 
     def decode(data: bytes) -> Any:
-        value = find(data)
-        return require_usable(slowly(data) if value is None else value)
+        for find in known:
+            if (value := find(data)) is not None:
+                if find is not known[0]:
+                    known.remove(find)
+                    known.insert(0, find)
+                return require_usable(value)
+        return require_usable(slowly(data))
 
     return decode
 
@@ -135,45 +139,29 @@ def _repeated(decode: Decode) -> Decode:
     return take
 
 
-def _finder(topic: Topic, arm: Arm) -> Decode:
-    """What finds the value in a message of a known layout, None in any other; the newest layout is tried first."""
-    if topic.type == TABLE:
-        return partial(_find_table, topic.columns, frames(arm), most_rows(topic, arm))
-    known: list[tuple[Callable[[bytes], Numbers | None], Callable[[Numbers], Any]]]
+def _known(topic: Topic, arm: Arm) -> list[Decode]:
+    """What finds the value in a message of each known layout, None in any other; the newest one is tried first."""
     if topic.type == JOINT_STATE:
         names = owners(topic, arm)
-        known = [(joint_states(names, counts).numbers, _as_state) for counts in product((len(names), 0), repeat=3)]
-    elif topic.type == WRENCH:
-        known = [(wrenches(frame).numbers, partial(_as_wrench, frame)) for frame in frames(arm)]
-    else:  # points, which no node takes in every period
-        known = []
-
-    def find(data: bytes) -> Any:
-        for layout in known:
-            numbers_of, value_of = layout
-            if (numbers := numbers_of(data)) is not None:
-                if layout is not known[0]:
-                    known.remove(layout)
-                    known.insert(0, layout)
-                return value_of(numbers)
-        return None
-
-    return find
+        return [partial(_find_state, joint_states(names, counts)) for counts in product((len(names), 0), repeat=3)]
+    if topic.type == WRENCH:
+        return [partial(_find_wrench, frame, wrenches(frame)) for frame in frames(arm)]
+    if topic.type == TABLE:
+        return [partial(_find_table, topic.columns, frame, most_rows(topic, arm)) for frame in frames(arm)]
+    return []  # points, which no node takes in every period
 
 
-def _as_state(numbers: Numbers) -> State:
-    return State(*map(list, numbers))
+def _find_state(layout: Pattern, data: bytes) -> State | None:
+    numbers = layout.numbers(data)
+    return None if numbers is None else State(*map(list, numbers))
 
 
-def _as_wrench(frame: str, numbers: Numbers) -> Wrench:
-    return Wrench(frame, numbers[0][:3], numbers[0][3:])
+def _find_wrench(frame: str, layout: Pattern, data: bytes) -> Wrench | None:
+    numbers: Any = layout.numbers(data)
+    return None if numbers is None else Wrench(frame, numbers[0][:3], numbers[0][3:])
 
 
-def _find_table(columns: tuple[str, ...], frames: tuple[str, ...], most: int, data: bytes) -> Table | None:
-    for frame in frames:
-        count = (len(data) - tables(columns, frame, 0).size) // (8 * len(columns))
-        if 0 <= count <= most:
-            numbers = tables(columns, frame, count).numbers(data)
-            if numbers is not None:
-                return Table(frame, tuple(zip(*[iter(numbers[0])] * len(columns), strict=True)))
-    return None
+def _find_table(columns: tuple[str, ...], frame: str, most: int, data: bytes) -> Table | None:
+    count = (len(data) - tables(columns, frame, 0).size) // (8 * len(columns))
+    numbers = tables(columns, frame, count).numbers(data) if 0 <= count <= most else None
+    return None if numbers is None else Table(frame, tuple(zip(*[iter(numbers[0])] * len(columns), strict=True)))
