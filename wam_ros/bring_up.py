@@ -20,7 +20,7 @@ from wam_ros.node import node_makers, parameter_file
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE, Stop
 from wam_ros.processors import placed_groups
 from wam_ros.ros_topics import NAMESPACE
-from wam_ros.run import FIRST, LAST, PARENT, Closing, Nodes, prepare_logging_directory, run
+from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, run
 
 LOGGER: Final = get_logger("wam")
 # codes of a recorder whose bag is whole, or that SIGTERM ended before it had one
@@ -86,7 +86,6 @@ class NodeProcess(CommandProcess):
         log_level: str = "error",
         place: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        prepare_logging_directory()
         self.nodes = [declared(entry).name for entry in entries]
         with parameter_file(configuration) as file:
             words = ["node", *entries, *_arguments(f"/dev/fd/{file.name}", namespace, log_level)]
@@ -222,7 +221,7 @@ def _ending(code: int) -> str:
     return f"was ended from outside by {name}{cause}"
 
 
-class Composition(Nodes):
+class Composition(Connection):
     """Nodes in this process, in one executor; leaving the context destroys them, brakes first, bag last.
 
     Parameters
@@ -230,7 +229,7 @@ class Composition(Nodes):
     configuration : values for all nodes; its `shared.nodes` names which ones are made.
     namespace : namespace of the nodes.
     domain_id : ROS domain, the one of the environment where None.
-    is_split : as for `Nodes`.
+    is_split : as for `Connection.make`.
     """
 
     def __init__(
@@ -242,7 +241,9 @@ class Composition(Nodes):
     ) -> None:
         with parameter_file(configuration) as file:
             own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
-            super().__init__(node_makers(configuration.shared.nodes, **own), (), namespace, domain_id, is_split)
+            makers = node_makers(configuration.shared.nodes, **own)
+            super().__init__(domain_id=domain_id)
+            self.make(makers, namespace, is_split)
 
     def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> str:
         """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it.

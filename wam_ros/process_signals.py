@@ -12,7 +12,7 @@ then: brakes on, bag closed.
 
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -59,20 +59,13 @@ class Stop:
         self.is_set = True
 
 
-def bound_leaving(context: Any, failure: Callable[[], str]) -> None:
-    """Let the system end this process where leaving the network with a context takes too long.
-
-    Parameters
-    ----------
-    context : `wam_ros.run.StackContext` of all nodes of this process.
-    failure : why one of them has failed, '' where none has; a failure is to be reported, however long that takes.
-    """
-    context.failure = failure
-
-
 @contextmanager
 def leaving(context: Any) -> Iterator[None]:
-    """What destroys a node, the last one with the participant; not its own work before."""
+    """What destroys a node, the last one with the participant; not its own work before.
+
+    The system ends this process where that takes too long, if the context of all its nodes has a `failure` that returns
+    '': a failure is to be reported, however long that takes.
+    """
     failure = getattr(context, "failure", None)
     if failure is None or failure():
         yield

@@ -24,7 +24,7 @@ from wam_description.message_bus import QueuedBus
 from wam_description.parameters import ParameterError
 from wam_ros.limits import NODE_LIMITS, PROCESS_LIMITS
 from wam_ros.network import limit_to_this_machine
-from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
+from wam_ros.process_signals import LISTENER_GONE, Stop
 from wam_ros.processors import keep_to_processors
 from wam_ros.ros_topics import NAMESPACE
 
@@ -62,7 +62,7 @@ class StackContext(Context):
     bus : that hands on what only nodes of this process publish; None where there is none.
     names : of these nodes.
     end : see `end_of_delivery`.
-    failure : see `bound_leaving`.
+    failure : why one of its nodes has failed, '' where none has: with it the end is bounded, see `leaving`.
     """
 
     bus: QueuedBus | None = None
@@ -117,6 +117,7 @@ class Connection(Closing):
     Attributes
     ----------
     context, executor : to make nodes with, and to spin.
+    nodes : those of `make` by name.
     listener_gone : whether one of those that take messages of these nodes was killed.
     """
 
@@ -132,7 +133,26 @@ class Connection(Closing):
         )
         self.executor = make_executor(self.context)
         self.listener_gone = False
+        self.nodes: dict[str, Any] = {}
         self._nodes: list[Node] = []
+
+    def make(self, makers: Mapping[str, MakeNode], namespace: str = NAMESPACE, is_split: bool = False) -> None:
+        """Make nodes that hand each other their messages; where one cannot be made, all is closed.
+
+        Parameters
+        ----------
+        makers : what makes each node, by its name; called with ``context`` and ``namespace``.
+        namespace : of the nodes.
+        is_split : whether their messages go through the middleware all the same, as between processes.
+        """
+        self.context.bus = None if is_split else QueuedBus(self.executor.create_task, NODE_LIMITS.turn)
+        self.context.names = frozenset(makers)
+        try:
+            for name, make in makers.items():
+                self.nodes[name] = self.add(make(context=self.context, namespace=namespace))
+        except BaseException:
+            self.close()
+            raise
 
     def add(self, node: Any) -> Any:
         """Take a node into the executor; it is destroyed with the connection."""
@@ -174,41 +194,6 @@ class Connection(Closing):
         rclpy.try_shutdown(context=self.context)
 
 
-class Nodes(Connection):
-    """Nodes of this process, which hand each other their messages.
-
-    Parameters
-    ----------
-    makers : what makes each node, by its name; called with ``context`` and ``namespace``.
-    arguments, domain_id : as for `Connection`.
-    namespace : of the nodes.
-    is_split : whether their messages go through the middleware all the same, as between processes.
-
-    Attributes
-    ----------
-    nodes : the nodes by name.
-    """
-
-    def __init__(
-        self,
-        makers: Mapping[str, MakeNode],
-        arguments: Sequence[str],
-        namespace: str = NAMESPACE,
-        domain_id: int | None = None,
-        is_split: bool = False,
-    ) -> None:
-        super().__init__(arguments, domain_id)
-        self.context.bus = None if is_split else QueuedBus(self.executor.create_task, NODE_LIMITS.turn)
-        self.context.names = frozenset(makers)
-        self.nodes: dict[str, Any] = {}
-        try:
-            for name, make in makers.items():
-                self.nodes[name] = self.add(make(context=self.context, namespace=namespace))
-        except BaseException:
-            self.close()
-            raise
-
-
 def run(
     makers: Mapping[str, MakeNode],
     arguments: Sequence[str],
@@ -236,7 +221,8 @@ def run(
     die_with_parent()
     stop = stop or Stop()
     try:
-        connection = Nodes(makers, arguments)
+        connection = Connection(arguments)
+        connection.make(makers)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     except RuntimeError as error:  # also security that is enforced where the middleware has none
@@ -263,7 +249,7 @@ def run(
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         connection.spin(is_over, end)
         before_end()
-        bound_leaving(connection.context, lambda: _failure(nodes.values()))
+        connection.context.failure = lambda: _failure(nodes.values())
     return _failure(nodes.values())
 
 

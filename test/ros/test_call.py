@@ -41,7 +41,7 @@ def stack(domain_of_module: int) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def is_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """The system would end the process of the tests as that of a command that does not leave the network."""
-    monkeypatch.setattr("wam_cli.commands.call.bound_leaving", lambda *given: None)
+    monkeypatch.setattr("wam_ros.process_signals.LONGEST", 1e6)
 
 
 def called(*words: str) -> tuple[int, str, str]:

@@ -25,7 +25,6 @@ from wam_live.services import SERVICES
 from wam_ros.client import START, StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
-from wam_ros.process_signals import bound_leaving
 
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 EXAMPLE: Final = "force_loop:force_gain=0.01"
@@ -80,7 +79,7 @@ def run(given: argparse.Namespace) -> int:
     others = {"get": _get, "set": _set, "echo": _echo, "push": _push}
     failure = ""
     with StackClient(given.namespace) as stack:
-        bound_leaving(stack.connection.context, lambda: failure)
+        stack.connection.context.failure = lambda: failure
         try:
             if given.request in others:
                 return others[given.request](given, stack)
