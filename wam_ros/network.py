@@ -76,7 +76,13 @@ class Place:
             self._socket.bind(_address(domain, namespace, name))
         except OSError:
             self._socket.close()
-            raise ParameterError(_taken(domain, namespace, name)) from None
+            pid = occupant(domain, namespace, name)
+            where = f"in namespace {namespace} of ROS domain {domain}" + (f" (process {pid})" if pid else "")
+            raise ParameterError(
+                f"node '{name}' already runs {where}; "
+                "stop it, or use another ROS_DOMAIN_ID, or give the nodes of a second arm a namespace: "
+                "wam up --namespace other, for one node -r __ns:=/other"
+            ) from None
         self._socket.listen()
 
     def close(self) -> None:
@@ -99,8 +105,7 @@ def require_places(names: Iterable[str], namespace: str) -> None:
     """
     domain, full = requested_domain(), f"/{namespace.strip('/')}"
     for name in names:
-        if occupant(domain, full, name):
-            raise ParameterError(_taken(domain, full, name))
+        Place(domain, full, name).close()
 
 
 def occupant(domain: int, namespace: str, name: str) -> int:
@@ -130,13 +135,3 @@ def is_inhabited(domain: int, sockets: Path = Path("/proc/net/udp")) -> bool:
 def _address(domain: int, namespace: str, name: str) -> bytes:
     text = f"wam_stack/{domain}{namespace.rstrip('/')}/{name}".encode()
     return b"\0" + (text if len(text) <= LONGEST_ADDRESS else b"wam_stack/" + sha256(text).hexdigest().encode())
-
-
-def _taken(domain: int, namespace: str, name: str) -> str:
-    pid = occupant(domain, namespace, name)
-    where = f"in namespace {namespace} of ROS domain {domain}" + (f" (process {pid})" if pid else "")
-    return (
-        f"node '{name}' already runs {where}; "
-        "stop it, or use another ROS_DOMAIN_ID, or give the nodes of a second arm a namespace: "
-        "wam up --namespace other, for one node -r __ns:=/other"
-    )
