@@ -77,7 +77,7 @@ def _outer(bench: DriverBench) -> str:
 
 
 def _arrays(bench: DriverBench) -> str:
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     bench.states()  # each has been read
     return ""
 
@@ -108,9 +108,9 @@ def _braked(bench: DriverBench) -> str:
     bench.brake()
     if wrong := bench.in_mode("braked"):
         return wrong
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     bench.forget()
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     return "a current flows" if bench.last_flow() else ""
 
 
@@ -223,14 +223,14 @@ _estop = partial(_at_once, service="estop", switch=None, mode="fault")
 def _discard(bench: DriverBench) -> str:
     bench.enable()
     bench.brake()
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     since = bench.status.since
     bench.is_answering = False
     bench.forget()
     done, text = bench.ask("enable", True)
     if not done:
         return f"enable, straight after a command, is refused: '{text}'"
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     if bench.last_flow():
         return "the current of an earlier command flows"
     return "" if bench.status.since > since else f"since stays {since} ns"
@@ -254,7 +254,7 @@ def _peers(bench: DriverBench) -> str:
         return f"no event of its status names velocity_loop and its fault, '{fault}': {named}"
     bench.ask("reset_fault")
     bench.report(fault)
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     return _enabled_after_reset(bench)
 
 
@@ -274,7 +274,7 @@ def _claims(bench: DriverBench) -> str:
 def _agreement(bench: DriverBench) -> str:
     bench.enable()
     bench.report(node="transform", started_with=bench.digests)
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     bench.report(started_with=bench.digests[:-1] + "?")
     try:
         return bench.in_mode("fault") or _enabled_after_reset(bench)
@@ -287,7 +287,7 @@ def _end(bench: DriverBench) -> str:
         raise Untested(RUNNING)
     bench.enable()
     bench.end()
-    bench.watch(CONFORMANCE_LIMITS.settle)
+    bench.watch()
     mode = bench.status.mode
     return "" if mode in ("braked", "fault") else f"its last status has the mode '{mode}'"
 

@@ -84,13 +84,9 @@ class DriverBench(StackClient):
         self.carrying = [0.0] * len(self.contract.motors)
         self.commanded = list(self.carrying)
         self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in (*KEPT, CLOCK)}
-        self._refused = ""
         self.reported: deque[tuple[float, NodeStatus]] = deque(maxlen=CONFORMANCE_LIMITS.kept)
         self.answered = 0
         self.longest_pause = 0.0
-        self.is_answering = True
-        self.after: list[Callable[[int], Any]] = []
-        self.wanted: Callable[[int, list[float]], Any] | None = None
         self._spun = math.inf
         for topic, arrays in KEPT.items():
             self.listen(topic, partial(self._keep, topic), arrays, partial(self._refuse, topic))
@@ -98,7 +94,7 @@ class DriverBench(StackClient):
         self.node.create_subscription(message_type(row), topic_name(self.node, row), keep, qos(row), raw=True)
         self.follow_statuses()
         self.lacking()  # of a service is there once there is a client
-        self.report()
+        self.be_proper()
 
     def _keep(self, topic: str, stamp: int, value: Any) -> None:
         self.arrived[topic].append(Arrived(time.monotonic(), stamp, value))
@@ -148,8 +144,11 @@ class DriverBench(StackClient):
         self.publisher(STATUS).publish(diagnostic_status(status, self.shared.arm.name))
 
     def be_proper(self) -> None:
-        """Answer again as a velocity loop that is right."""
-        self.is_answering, self.wanted, self.after, self._refused = True, None, [], ""
+        """Answer as a velocity loop that is right."""
+        self._refused = ""
+        self.is_answering = True
+        self.after: list[Callable[[int], Any]] = []
+        self.wanted: Callable[[int, list[float]], Any] | None = None
         self.report()
 
     # looking
@@ -171,8 +170,8 @@ class DriverBench(StackClient):
         before, self._spun = self._spun, time.monotonic()
         self.longest_pause = max(self.longest_pause, self._spun - before)
 
-    def watch(self, seconds: float) -> None:
-        """Let time pass."""
+    def watch(self, seconds: float = CONFORMANCE_LIMITS.settle) -> None:
+        """Let time pass, by default that in which a command acts."""
         self.wait(lambda: False, seconds)
 
     def ask(self, service: str, switch: bool | None = None) -> tuple[bool, str]:
@@ -215,11 +214,11 @@ class DriverBench(StackClient):
         for _ in range(CONFORMANCE_LIMITS.enable_attempts):
             self.brake()
             self.is_answering = True
-            self.watch(CONFORMANCE_LIMITS.settle)
+            self.watch()
             self.await_person(is_taken)
             if answer[0] and self.wait(lambda: self.status.mode == "enabled", REPLY):
                 self.forget()
-                self.watch(CONFORMANCE_LIMITS.settle)
+                self.watch()
                 if self.status.mode == "enabled":
                     return
         raise Untested(f"the driver cannot be enabled: {answer[1] or self.status.message or 'no answer'}")
@@ -231,7 +230,7 @@ class DriverBench(StackClient):
             if self.status.message != warning:
                 warning = self.status.message
                 self.node.get_logger().warning(f"the driver waits; {warning}")
-            self.watch(CONFORMANCE_LIMITS.settle)
+            self.watch()
 
     def states(self) -> list[Arrived]:
         """The states that came.
@@ -319,7 +318,7 @@ class DriverBench(StackClient):
             self.enable()
             self.after = [make] * 5
             self.wait(lambda: not self.after, REPLY)
-            self.watch(CONFORMANCE_LIMITS.settle)
+            self.watch()
             for state in self.states():
                 for i, flow in enumerate(self.flow(state)):
                     if flow * bad[i] > 0.7 * bad[i] ** 2:
