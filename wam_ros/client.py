@@ -14,6 +14,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from wam_description.arm import Shared
 from wam_description.interface import Interface
+from wam_description.message_bus import Take
 from wam_description.nodes import NODES
 from wam_description.parameters import build_part
 from wam_description.signals import Answer, NodeStatus
@@ -249,7 +250,7 @@ class StackClient(Closing):
     def listen(
         self,
         topic: str,
-        take: Callable[[int, Any], None],
+        take: Take,
         arrays: str = "",
         refuse: Callable[[str], None] = lambda reason: None,
     ) -> None:

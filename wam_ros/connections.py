@@ -106,7 +106,7 @@ class StackNode(TolerantNode):
             self.health.facts[PRIORITY] = OWN.granted
             if self.is_first:
                 self.get_logger().info(f"{PRIORITY}: {OWN.granted}")
-            self._share_timer = self.create_timer(PROCESS_LIMITS.share_look, self._look_at_share)
+            self.create_timer(PROCESS_LIMITS.share_look, self._look_at_share)
 
     def _look_at_share(self) -> None:
         if OWN.look():

@@ -239,9 +239,10 @@ class Health:
 
     def report_end(self) -> None:
         """Report how much was published in all."""
-        self._report(**{ENDED: "yes"})
+        self.facts[ENDED] = "yes"
+        self._report()
 
-    def _report(self, **more: str) -> None:
+    def _report(self) -> None:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""
         node, outlets = self._node, self._node.outlets
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
@@ -253,7 +254,7 @@ class Health:
         facts = {key: str(count) for key, count in sorted({**self.counts, **refused}.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
         facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
-        facts |= {**self.facts, **more}
+        facts |= self.facts
         name, present = diagnosed_name(node.get_namespace(), node.get_name()), self.status
         status = NodeStatus(present.level, present.message, name, self.is_ready, fault=present.fault, facts=facts)
         message = diagnostic_status(status, self._node.shared.arm.name)

@@ -7,9 +7,9 @@ from rclpy.subscription import Subscription
 
 from wam_description.event import Event, fault
 from wam_description.event_text import sentence
+from wam_description.message_bus import Take
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.messages import Refused, message_type
-from wam_ros.outlets import Sent
 from wam_ros.ros_topics import listening, topic_name, waiting
 from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import decoder, requirement, stamp_in
@@ -94,7 +94,7 @@ class Inlets:
     def feed(
         self,
         topic: str,
-        take: Callable[[int, Any], None],
+        take: Take,
         arrays: str = "",
         accepts: Callable[[int], bool] = lambda stamp: True,
     ) -> None:
@@ -128,9 +128,7 @@ class Inlets:
         )
         self.claims[topic] = claim = PublisherClaim(node, topic, self.subscriptions[topic])
 
-    def listen(
-        self, topic: str, receive: Callable[[bytes], None], take: Callable[[int, Sent], None] = lambda stamp, sent: None
-    ) -> bool:
+    def listen(self, topic: str, receive: Callable[[bytes], None], take: Take = lambda stamp, sent: None) -> bool:
         """Subscribe to the bytes of messages, or to the values that only nodes of this process publish.
 
         To fetch bytes from the middleware, once for each listener, took most of the time of several nodes in one

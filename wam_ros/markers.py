@@ -28,13 +28,12 @@ def contact_markers(stamp: int, view: ContactView) -> MarkerArray:
     stamp : time, ns.
     view : what to draw.
     """
-    cover, place, force = view.contact.cover, view.contact.position, view.contact.force
+    cover, place, force, *_ = view.contact
     gone = Marker(header=header(stamp, BASE), action=Marker.DELETEALL)
     if not cover:
         return MarkerArray(markers=[gone])
     mine = next((0.5 * (part.low + part.high) for part in view.likely if part.cover == cover), 0.0)
-    x = mine if isnan(place) else float(place)
-    colour = GREY if isnan(place) else RED
+    x, colour = (mine, GREY) if isnan(place) else (float(place), RED)
     tip = Point(x=x, y=0.0, z=0.0)
     fx, fy, fz = (METRES_PER_NEWTON * float(component) for component in force)
     arrow = _marker(stamp, cover, "contact", 0, Marker.ARROW, colour, (0.01, 0.02, 0.03))

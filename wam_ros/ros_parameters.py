@@ -41,13 +41,7 @@ def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
     for part, instance in ((Shared, shared), (cls, own)):
         current = values(instance)
         for field in fields(part):
-            value = current[field.name]
-            node.declare_parameter(
-                field.name,
-                Parameter(field.name, value=listed(value)).value,
-                descriptor(field),
-                ignore_override=True,
-            )
+            node.declare_parameter(field.name, listed(current[field.name]), descriptor(field), ignore_override=True)
     return shared, own
 
 

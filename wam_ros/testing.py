@@ -31,7 +31,7 @@ from wam_ros.limits import TEST_LIMITS
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
-from wam_ros.wire import decoder, encoder, stamp_in
+from wam_ros.wire import decoder, requirement, stamp_in
 
 _EMPTY: Final[Mapping[str, Any]] = {
     JOINT_STATE: State([], [], []),
@@ -269,9 +269,7 @@ class RunningArm:
     def _refusals(self) -> dict[str, str]:
         """The node that refused a message last and its reason, by topic; this kit looks at what no node takes."""
         found = ((name, node.health.refusals) for name, node in self.nodes.items() if hasattr(node, "health"))
-        refused = {
-            topic: f"{name}: {one.reason}" for name, refusals in found for topic, one in refusals.items() if one.count
-        }
+        refused = {topic: f"{name}: {one.reason}" for name, refusals in found for topic, one in refusals.items()}
         for topic in self._untaken:
             try:
                 self.newest(topic)
@@ -333,8 +331,7 @@ class RunningArm:
         stamp = stamp_in(states[-1]) if states else 0
         value = self.value(topic, **fields) if value is None else value
         if not self.interface.subscribers(topic):
-            row, shared = self._row(topic), self.configuration.shared
-            decoder(row, shared, ANY)(encoder(row, shared)(stamp, value))
+            requirement(self._row(topic), self.configuration.shared, ANY)(value)
         self._streams[topic] = stamp + round(seconds * SECOND), value
         self._stream(stamp, topic)
 
