@@ -9,13 +9,13 @@ from typing import Any
 
 from wam_description.arm import Shared, Timing
 from wam_description.parameters import build_part
-from wam_description.signals import Answer, Wrench
+from wam_description.signals import ZERO, Answer, Wrench
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.page import name_page, quiet, serve, url
-from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of, paragraph
+from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, paragraph
 from wam_live.push import release
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import Scene
@@ -110,7 +110,7 @@ class ShownStack:
         namespace = self._node.get_namespace()
         more = f", {shared.arm.name}, since {time.strftime('%H:%M:%S')}"
         name_page(server, f"{namespace}, domain {context.get_domain_id()}", more)
-        self._source = RunningStack(context, namespace, shared, client.statuses)
+        self._source = RunningStack(context, namespace, shared)
         self._press: Press | None = None
         self._states: Any = None  # subscription while somebody presses
         self._force, self._push = (HeldTopic(self._node, name, shared) for name in ("force_command", "sim/disturbance"))
@@ -125,7 +125,7 @@ class ShownStack:
 
     def draw(self) -> None:
         """Show the present instant, and do what was requested on the page."""
-        snapshot = self._source.snapshot()
+        snapshot = self._source.snapshot()._replace(statuses=self._client.statuses)
         with self._server.atomic():
             self.scene.show(snapshot)
             push = self.scene.push()
@@ -148,7 +148,7 @@ class ShownStack:
 
     @property
     def _is_enabled(self) -> bool:
-        return mode_of(self._client.statuses) == "enabled"
+        return self._client.mode == "enabled"
 
     def _send(self, push: Wrench | None) -> None:
         """Stream the push of a drag until its end; end a force whose arm has stopped."""
@@ -174,7 +174,7 @@ class ShownStack:
     def _answer(self, state: bytes) -> None:
         if self._press is None:
             return
-        if refusal := self._force.send(stamp_in(state), Wrench(*self._press, (0.0, 0.0, 0.0))):
+        if refusal := self._force.send(stamp_in(state), Wrench(*self._press, ZERO)):
             self._press = None
             self.panel.notify(f"not pressed: {refusal}", refused=True)
 
@@ -194,22 +194,23 @@ class ShownStack:
 
     def _ask(self, request: Request, text: str = "") -> None:
         """Make a request, and show its answer, or a text in place of it."""
-        if isinstance(request, Play) and not request.script:
-            self.player.stop()
-        elif isinstance(request, Play):
-            refusal = self.player.play(request.script)
-            self.panel.notify(refusal or f"playing {request.script}", refused=bool(refusal))
-        elif isinstance(request, Bend):
-            refusal = self._bend()
-            self.panel.notify(f"not moved: {refusal}" if refusal else "bending the arm", refused=bool(refusal))
-        elif isinstance(request, Press) and any(request.force):
-            self._start_press(request)
-        elif isinstance(request, Press):
-            if self._press is not None:
-                self._end_press()
-                self.panel.notify("letting go")
-        else:
-            self._call(request, text)
+        match request:
+            case Play(""):
+                self.player.stop()
+            case Play(script):
+                refusal = self.player.play(script)
+                self.panel.notify(refusal or f"playing {script}", refused=bool(refusal))
+            case Bend():
+                refusal = self._bend()
+                self.panel.notify(f"not moved: {refusal}" if refusal else "bending the arm", refused=bool(refusal))
+            case Press(_, force) if any(force):
+                self._start_press(request)
+            case Press():
+                if self._press is not None:
+                    self._end_press()
+                    self.panel.notify("letting go")
+            case _:
+                self._call(request, text)
 
     def _call(self, request: Call | SetParameters, text: str) -> None:
         client, message = self._client.service(request)

@@ -15,7 +15,7 @@ from viser import uplot
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
 from wam_description.arm import Arm
 from wam_description.event import Level
-from wam_description.signals import BASE, Contact, NodeStatus, Triple
+from wam_description.signals import BASE, ZERO, Contact, NodeStatus, Triple
 from wam_description.status import PAUSED
 from wam_description.wiring import Call, SetParameters
 from wam_live.services import SERVICES
@@ -37,7 +37,7 @@ BUTTONS: Final = {  # by row: label and its requests
     "time": {"Pause": "pause", "Step": "step", "Run": "resume"},
     "reset": {"Fault": "reset_fault", "Arm": "reset"},
 }
-DOTS: Final = {Level.OK: "#2f9e44", Level.WARN: "#f08c00", Level.ERROR: "#e03131", None: "#adb5bd"}
+DOTS: Final = {Level.OK: "#2f9e44", Level.WARN: "#f08c00", Level.ERROR: "#e03131", Level.STALE: "#adb5bd"}
 DITHER: Final = ("velocity_loop", "dither.level")  # 0 switches it off
 SLIDERS: Final = {  # live parameters of nodes; value at the right end of the slider, step
     ("force_loop", "force_gain"): (0.2, 0.001),
@@ -64,7 +64,7 @@ class Bend(NamedTuple):
     """The arm to the posture in which the force loop was assessed, `guard.posture`."""
 
 
-NO_PRESS: Final = Press(BASE, (0.0, 0.0, 0.0))
+NO_PRESS: Final = Press(BASE, ZERO)
 FIRST_SCRIPT: Final = "demo_scenario"
 Request = Call | SetParameters | Press | Play | Bend
 
@@ -286,22 +286,21 @@ def paragraph(text: str, colour: str = "") -> str:
 
 def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0) -> str:
     """Status as HTML: the driver first, then what is done by hand, the nodes that warn, the contact."""
-    driver = snapshot.statuses.get("driver")
-    mode = mode_of(snapshot.statuses) or "waiting for the stack"
-    is_paused = driver is not None and PAUSED in driver.facts
-    lost = driver is not None and not is_paused and snapshot.silent > LIVE.silent
+    driver = snapshot.statuses.get("driver", NodeStatus(Level.STALE, "none has come"))
+    mode, is_paused = driver.mode or "waiting for the stack", PAUSED in driver.facts
+    lost = bool(driver.mode) and not is_paused and snapshot.silent > LIVE.silent
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""
     factor = " · paused" if is_paused else factor
     lines = [
         paragraph(
-            f'<b style="font-size:18px">{dot(driver.level if driver and not lost else None)} {mode}</b>'
+            f'<b style="font-size:18px">{dot(Level.STALE if lost else driver.level)} {mode}</b>'
             f" · {snapshot.seconds:.1f} s{factor}"
         )
     ]
     if lost:
         text = f"no state of the arm for {snapshot.silent:.0f} s: the stack has ended, or waits for a node"
         lines.append(paragraph(text, DOTS[Level.ERROR]))
-    if driver and driver.fault:
+    if driver.fault:
         lines.append(paragraph(html.escape(driver.fault), DOTS[Level.ERROR]))
     if pressing:
         lines.append(press_text(snapshot, pressing))
@@ -328,12 +327,6 @@ def press_text(snapshot: Snapshot, pressing: float) -> str:
     return paragraph(f"commanded <b>{pressing:.1f} N</b>, measured {snapshot.measured:.1f} N")
 
 
-def mode_of(statuses: Mapping[str, NodeStatus]) -> str:
-    """State of the driver, '' where it is not known."""
-    driver = statuses.get("driver")
-    return driver.mode if driver else ""
-
-
 def margin_text(facts: Mapping[str, str]) -> str:
     """The factor by which the gains may be larger, as the guard of the force loop reports it, as HTML."""
     if "margin" not in facts:
@@ -345,7 +338,7 @@ def margin_text(facts: Mapping[str, str]) -> str:
     return text
 
 
-def dot(level: Level | None) -> str:
+def dot(level: Level) -> str:
     """A dot in the colour of a level."""
     return f'<span style="color:{DOTS[level]}">&#9679;</span>'
 

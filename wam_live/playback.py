@@ -3,8 +3,9 @@
 import math
 import time
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
-from typing import Final, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from operator import itemgetter
+from typing import Final
 
 import numpy as np
 
@@ -25,21 +26,15 @@ from wam_sim.replay import tables
 SPEEDS: Final = ("0.1", "0.25", "0.5", "1", "2", "5")
 
 
-class StampedTables(NamedTuple):
-    """The tables of a topic and their stamps, ns."""
+def stamped(columns: TableColumns | None) -> list[tuple[int, Table]]:
+    """Stamps, ns, and tables of the recorded messages of a topic; none for None."""
+    return [] if columns is None else list(zip(columns.stamp_ns.tolist(), tables(columns), strict=True))
 
-    stamps: list[int]
-    tables: list[Table]
 
-    @classmethod
-    def of(cls, columns: TableColumns | None) -> "StampedTables":
-        """Tables and stamps of the recorded messages of a topic; empty for None."""
-        return cls([], []) if columns is None else cls(columns.stamp_ns.tolist(), tables(columns))
-
-    def at(self, stamp: int, held: float = math.inf) -> Table | None:
-        """The last table at or before a time, ns, if it is not older than `held`, ns."""
-        row = bisect_right(self.stamps, stamp) - 1
-        return self.tables[row] if row >= 0 and stamp - self.stamps[row] < held else None
+def table_at(found: Sequence[tuple[int, Table]], stamp: int, held: float = math.inf) -> Table | None:
+    """The last of stamped tables at or before a time, ns, if it is not older than `held`, ns."""
+    row = bisect_right(found, stamp, key=itemgetter(0)) - 1
+    return found[row][1] if row >= 0 and stamp - found[row][0] < held else None
 
 
 class BagSource:
@@ -63,11 +58,9 @@ class BagSource:
         self._stamps, self._angles = poses
         self._traces = recording.traces
         self._covers = self.recorded.arm.covers.names
-        statuses = sorted(recording.run.stamped_statuses(), key=lambda one: one[0])
-        self._statuses = [status for _, status in statuses]
-        self._status_stamps = [stamp for stamp, _ in statuses]
-        self._hypotheses = StampedTables.of(recording.run.table("contact/hypotheses"))
-        self._objects = StampedTables.of(recording.run.table("sim/objects"))
+        self._statuses = sorted(recording.run.stamped_statuses(), key=itemgetter(0))
+        self._hypotheses = stamped(recording.run.table("contact/hypotheses"))
+        self._objects = stamped(recording.run.table("sim/objects"))
         self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
 
     def snapshot(self, stamp: int) -> Snapshot:
@@ -75,18 +68,18 @@ class BagSource:
         at = row_at(self._stamps, stamp)
         traces, row = self._traces, int(np.searchsorted(self._traces.stamp, stamp, side="right")) - 1
         known = row >= 0
-        hypotheses = self._hypotheses.at(stamp, LIVE.held)
-        until = bisect_right(self._status_stamps, stamp)
+        hypotheses = table_at(self._hypotheses, stamp, LIVE.held)
+        until = bisect_right(self._statuses, stamp, key=itemgetter(0))
         return Snapshot(
             stamp=stamp,
             q=tuple(self._angles[at].tolist()),
             true=self._contact(traces.true, row) if known else NO_CONTACT,
-            estimated=contact_of(hypotheses, self._covers) if self._hypotheses.tables else self._alone(row),
+            estimated=contact_of(hypotheses, self._covers) if self._hypotheses else self._alone(row),
             likely=likely_of(hypotheses, self._covers),
             commanded=float(traces.commanded.size[row]) if known else NAN,
             measured=float(traces.measured.size[row]) if known else NAN,
-            statuses={status.node: status for status in self._statuses[:until]},
-            objects=objects_of(self._objects.at(stamp)),
+            statuses={status.node: status for _, status in self._statuses[:until]},
+            objects=objects_of(table_at(self._objects, stamp)),
         )
 
     def past(self, stamp: int) -> Iterator[Snapshot]:

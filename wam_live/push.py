@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from functools import partial
 
 from wam_description.arm import Shared
-from wam_description.signals import BASE, NodeStatus, Wrench
+from wam_description.signals import BASE, ZERO, NodeStatus, Wrench
 from wam_description.status import PAUSED
 from wam_live.hold import HeldTopic
 from wam_ros.client import StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.ros_topics import stamp_of
 
-NO_PUSH = Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+NO_PUSH = Wrench(BASE, ZERO, ZERO)
 
 
 def push(stack: StackClient, shared: Shared, wrench: Wrench, seconds: float) -> float:

@@ -5,6 +5,7 @@ a picture is drawn.
 """
 
 import time
+from contextlib import suppress
 from typing import Any, Final
 
 from rclpy.node import Node
@@ -13,7 +14,7 @@ from rclpy.subscription import Subscription
 
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.arm import Shared
-from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, State, Table
+from wam_description.signals import BASE, NO_CONTACT, Contact, State, Table
 from wam_description.topics import BY_NAME
 from wam_live.snapshot import NAN, Snapshot, objects_of, size
 from wam_live.thresholds import LIVE
@@ -32,10 +33,9 @@ class RunningStack:
     context : of ROS.
     namespace : of the stack.
     shared : shared parameters of the driver.
-    statuses : newest of each node, by name, kept up to date by somebody else.
     """
 
-    def __init__(self, context: Any, namespace: str, shared: Shared, statuses: dict[str, NodeStatus]) -> None:
+    def __init__(self, context: Any, namespace: str, shared: Shared) -> None:
         # its node is in no executor: what has come is taken when a picture is drawn
         self.node = Node("live_view", context=context, namespace=namespace)
         self._covers = shared.arm.covers.names
@@ -43,23 +43,19 @@ class RunningStack:
         self._decoders = {
             name: decoder(BY_NAME[name], shared, "position?" if "joint" in name else "") for name in TOPICS
         }
-        self._newest: dict[str, Any] = {}
-        self._stamps: dict[str, int] = {}
-        self.statuses = statuses
+        self._newest: dict[str, tuple[int, Any]] = {}
         self._pace: tuple[float, int] = (time.monotonic(), 0)
         self._factor = NAN
         self._heard = self._pace
 
     def snapshot(self) -> Snapshot:
-        """What the stack shows now."""
+        """What the stack shows now, without the statuses of its nodes."""
         for name, subscription in self._topics.items():
             if (data := _taken(subscription)) is not None:
-                try:
-                    self._newest[name], self._stamps[name] = self._decoders[name](data), stamp_in(data)
-                except Refused:
-                    continue
-        truth = self._newest.get("sim/joint_states")
-        joints: State | None = truth or self._newest.get("joint_states")
+                with suppress(Refused):
+                    self._newest[name] = stamp_in(data), self._decoders[name](data)
+        truth = self._of("sim/joint_states")[1]
+        joints: State | None = truth or self._of("joint_states")[1]
         table: Table | None = self._fresh("contact/hypotheses")
         return Snapshot(
             stamp=self.stamp,
@@ -69,16 +65,19 @@ class RunningStack:
             likely=likely_of(table, self._covers),
             commanded=self._force("force_command"),
             measured=self._force("force_measured"),
-            statuses=self.statuses,
             real_time_factor=self._real_time_factor(),
             silent=self._silent(),
-            objects=objects_of(self._newest.get("sim/objects")),
+            objects=objects_of(self._of("sim/objects")[1]),
         )
 
     @property
     def stamp(self) -> int:
         """Time of the newest state of the arm, ns."""
-        return max(self._stamps.get("joint_states", 0), self._stamps.get("sim/joint_states", 0))
+        return max(self._of("joint_states")[0], self._of("sim/joint_states")[0])
+
+    def _of(self, topic: str) -> tuple[int, Any]:
+        """Stamp, ns, and value of the newest of a topic; 0 and None before it."""
+        return self._newest.get(topic, (0, None))
 
     def _true(self) -> Contact:
         wrench, point = self._fresh("sim/contact/wrench"), self._fresh("sim/contact/point")
@@ -92,8 +91,8 @@ class RunningStack:
 
     def _fresh(self, topic: str) -> Any:
         """The newest of a topic, None where it is old: its node may be gone."""
-        is_old = self.stamp - self._stamps.get(topic, 0) >= LIVE.old
-        return None if is_old else self._newest.get(topic)
+        stamp, value = self._of(topic)
+        return None if self.stamp - stamp >= LIVE.old else value
 
     def _silent(self) -> float:
         now = time.monotonic()

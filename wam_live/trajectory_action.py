@@ -6,6 +6,7 @@ A node next to the stack, as a program of the user's would be: it streams the tr
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import rclpy
@@ -92,7 +93,8 @@ class TrajectoryActionNode(Node):
                 self._tolerances(goal.goal_tolerance),
                 goal.goal_time_tolerance.sec + goal.goal_time_tolerance.nanosec * 1e-9,
             )
-            _require_joints_alone(goal)
+            if goal.multi_dof_trajectory.points or goal.component_path_tolerance or goal.component_goal_tolerance:
+                raise Refused("joints of several degrees of freedom are named; this arm has none")
         except Refused as refusal:
             code = GoalCode.INVALID_JOINTS if isinstance(refusal, WrongNames) else GoalCode.INVALID_GOAL
             return GoalEnd(code, str(refusal))
@@ -169,17 +171,15 @@ class TrajectoryActionNode(Node):
             following.future.set_result(end)
 
 
+@dataclass
 class _Following:
     """A goal under way, its publisher, and the stamp of its last feedback, ns."""
 
-    def __init__(self, handle: Any, goal: TrajectoryGoal, publisher: Any, future: Any) -> None:
-        self.handle, self.goal, self.publisher, self.future = handle, goal, publisher, future
-        self.reported = 0
-
-
-def _require_joints_alone(goal: Any) -> None:
-    if goal.multi_dof_trajectory.points or goal.component_path_tolerance or goal.component_goal_tolerance:
-        raise Refused("joints of several degrees of freedom are named; this arm has none")
+    handle: Any
+    goal: TrajectoryGoal
+    publisher: Any
+    future: Any
+    reported: int = 0
 
 
 def serve(namespace: str, until: Callable[[], bool], report: Callable[[str], None]) -> None:

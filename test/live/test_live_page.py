@@ -494,7 +494,7 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
 
 def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: Network) -> None:
     node, shared = ros.node("driver"), CONFIGURATION.shared
-    stack = RunningStack(ros.context, "wam", shared, {})
+    stack = RunningStack(ros.context, "wam", shared)
     rows = {name: BY_NAME[name] for name in ("sim/contact/wrench", "sim/contact/point", "sim/joint_states")}
     publishers = {name: node.create_publisher(message_type(row), name, qos(row)) for name, row in rows.items()}
     values = (
