@@ -21,7 +21,9 @@ PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 # The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (the benchmark `compiled`).
 # The substeps of the plant are C then, too: wam_driver/fast_steps.c.  WAM_COMPILE=auto: only where that is possible.
 COMPILED = (
+    "wam_bag/bag_writer.py",
     "wam_bag/cdr.py",
+    "wam_bag/mcap_writer.py",
     "wam_bag/value_messages.py",
     "wam_control/contact/contact_estimator.py",
     "wam_control/contact/contact_fit.py",
@@ -68,6 +70,7 @@ COMPILED = (
     "wam_driver/plant.py",
     "wam_driver/safety.py",
     "wam_driver/sensors.py",
+    "wam_ros/recorder.py",
     "wam_ros/wire.py",
     "wam_sim/bus.py",
     "wam_sim/simulation.py",

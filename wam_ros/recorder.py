@@ -3,7 +3,7 @@
 import re
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
@@ -112,6 +112,7 @@ class _Channel:
         self.totals: dict[str, int] = {}  # published by each node that has announced it
         self._first_totals: dict[str, int] = {}
         self._is_shared = topic.name in EVERY_NODE
+        self._only_node: str | None = None  # that publishes this topic, once a message has come; '' where several do
 
     def sender_of(self, data: bytes) -> tuple[str, bool]:
         """The node that sent a message, which rclpy does not report; whether it is of another arm or program.
@@ -120,16 +121,13 @@ class _Channel:
         which all arms share, that of this arm comes before it; what others send there has stamps of its own.
         """
         if not self._is_shared:
+            if self._only_node is None:
+                nodes = set(self._writers().values())
+                self._only_node = nodes.pop() if len(nodes) == 1 else ""
             return self._only_node, False
         name = _status_name(self.topic.type, data)
         is_foreign = self.topic.type == _DIAGNOSTICS and not name.startswith(self._arm)
         return re.split("[:/]", name.removeprefix(self._arm))[0].strip() or "?", is_foreign
-
-    @cached_property
-    def _only_node(self) -> str:
-        """The node that publishes this topic, once a message has come; '' where there are several."""
-        nodes = set(self._writers().values())
-        return nodes.pop() if len(nodes) == 1 else ""
 
     def announce(self, node: str, total: int) -> None:
         """A node has published so many messages on this topic."""

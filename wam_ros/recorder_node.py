@@ -156,9 +156,10 @@ class RecorderNode(StackNode):
         """Record what has arrived, in the order in which it was sent: the time of a message may be that before it."""
         arrived: list[tuple[int, str, bytes, int, int]] = []
         for name, subscription in self._drained.items():
-            with subscription.handle:
+            handle = subscription.handle
+            with handle:
                 for _ in range(DEPTH):
-                    taken = subscription.handle.take_message(subscription.msg_type, True)
+                    taken = handle.take_message(subscription.msg_type, True)
                     if taken is None:
                         break
                     data, info = taken

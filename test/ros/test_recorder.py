@@ -23,9 +23,9 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from ros_network import Network
 from rosbags.highlevel import AnyReader
@@ -108,11 +108,7 @@ def recorder_process(ros: Any, directory: Path, **choices: Any) -> Iterator[subp
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters(directory, **choices)}}))
     command = [sys.executable, "-m", "wam_cli.program", "node", "recorder", "--ros-args", "-r", "__ns:=/wam"]
     process = subprocess.Popen(
-        [*command, "--params-file", str(file)],
-        env=ros.environment,
-        cwd=ROOT,
-        text=True,
-        stderr=subprocess.PIPE,
+        [*command, "--params-file", str(file)], env=ros.environment, cwd=ROOT, text=True, stderr=subprocess.PIPE
     )
     try:
         yield process
@@ -583,12 +579,7 @@ ALL = list(range(1, 101))
     ],
 )
 def test_losses_are_those_of_each_life_of_a_node(
-    first: tuple[list[int], int],
-    second: tuple[list[int], int],
-    dropped: int,
-    missed: int,
-    lacking: int,
-    present: bool,
+    first: tuple[list[int], int], second: tuple[list[int], int], dropped: int, missed: int, lacking: int, present: bool
 ) -> None:
     found = lives(first, second, present=present)
     assert (found.dropped, found.missed, found.lacking()) == (dropped, missed, lacking)
@@ -681,13 +672,14 @@ def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: P
 
 def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, monkeypatch: pytest.MonkeyPatch) -> None:
     published: Counter[str] = Counter()
-    publish = Publisher.publish
+    for form in ("publish", "publish_raw"):
+        publish = getattr(_rclpy.Publisher, form)
 
-    def counting(self: Any, message: Any) -> None:
-        published[self.topic_name] += 1
-        publish(self, message)
+        def counting(handle: Any, message: Any, publish: Any = publish) -> None:
+            published[handle.get_topic_name()] += 1
+            publish(handle, message)
 
-    monkeypatch.setattr(Publisher, "publish", counting)
+        monkeypatch.setattr(_rclpy.Publisher, form, counting)
     bag = arm.play([{"name": "speak", "seconds": 0.3}])
     recorded = dict(read(bag.path, ()).counts)
     assert published["/wam/motor_states"] == 301
