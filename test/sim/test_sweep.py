@@ -14,7 +14,7 @@ from wam_description.parameters import ParameterError
 from wam_sim.batch import results
 from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points
 from wam_studies.thesis import definition
-from wam_studies.thesis.study import measure, swept
+from wam_studies.thesis.measurement import measure, swept
 
 GAIN = "force_loop:force_gain"
 STEPS = """

@@ -16,21 +16,13 @@ from wam_description.configuration import packaged
 from wam_description.parameters import ParameterError
 from wam_description.units import si
 from wam_studies.page import section_of
-from wam_studies.thesis import (
-    arm_forces,
-    cables,
-    force_accuracy,
-    limit_cycles,
-    quantised,
-    testbed,
-    transmission,
-)
+from wam_studies.thesis import arm_forces, cables, force_accuracy, limit_cycles, quantised, testbed, transmission
 from wam_studies.thesis.definition import configured, load, names
 from wam_studies.thesis.evaluation import function_of
+from wam_studies.thesis.measurement import ExperimentCase, measure
 from wam_studies.thesis.one_link import one_link, played
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result
-from wam_studies.thesis.study import ExperimentCase, measure
 
 LEVER = 0.9144  # m
 STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad

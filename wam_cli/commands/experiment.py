@@ -1,4 +1,4 @@
-"""`wam experiment`: experiments of the thesis as a study, whose bags are kept; their sample bags."""
+"""`wam experiment`: experiments of the thesis, whose bags are kept; their sample bags."""
 
 import argparse
 import contextlib
@@ -11,18 +11,16 @@ from pathlib import Path
 from wam_analysis.table import markdown
 from wam_bag.bag_name import dated
 from wam_cli.options import PAGE, bounded, writable_directory
-from wam_description.configuration import Configuration, packaged
 from wam_ros.bring_up import Composition
-from wam_sim.batch import processes
+from wam_sim.batch import processes, results
 from wam_sim.progress import Progress
 from wam_studies.figures.style import draw_panels
-from wam_studies.harness import evaluate
 from wam_studies.page import kept_rows, section_of, with_section
 from wam_studies.thesis import evaluation
 from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
+from wam_studies.thesis.measurement import ExperimentCase, ExperimentRecord, measure
 from wam_studies.thesis.rows import PAGE_HEAD, Result, summary
 from wam_studies.thesis.samples import FOLDER, INDEX, LIMIT, Entry, check, make, read_index, write_index
-from wam_studies.thesis.study import ExperimentCase, ExperimentRecord, ExperimentStudy
 
 PICTURE = "result.png"
 SECTION = "experiments"  # of the page
@@ -78,12 +76,11 @@ def run(given: argparse.Namespace) -> int:
     chosen = list(map(load, names() if given.all else given.experiment))
     directories = [_directory(given, one, len(chosen) == 1 and not given.all) for one in chosen]
     cases = tuple(ExperimentCase(one, str(directory)) for one, directory in zip(chosen, directories, strict=True))
-    study = ExperimentStudy(Configuration.load(packaged(chosen[0].configuration)), cases)
     if given.evaluate:
         records = [ExperimentRecord(one.name, "", evaluation.evaluate(one, Path(bags))) for one, bags in cases]
     else:
         with processes(min(given.jobs, len(cases))) as executor:
-            records = evaluate(study, {1: cases}, executor, report=Progress("experiments", sys.stderr)).total
+            records = results(measure, cases, executor, report=Progress("experiments", sys.stderr))
     found = []
     for experiment, directory, record in zip(chosen, directories, records, strict=True):
         result = record.result
@@ -100,7 +97,7 @@ def run(given: argparse.Namespace) -> int:
         found.append((experiment, result, picture))
     if given.write:
         _write(given.write, found)
-    return 2 if len(found) < len(records) else int(bool(study.score(records).missed))
+    return 2 if len(found) < len(records) else int(not all(result.agrees for _, result, _ in found))
 
 
 def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) -> Path:

@@ -36,7 +36,7 @@ from wam_sim.batch import results
 from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, outcome, points
 from wam_studies.figures.style import panels
 from wam_studies.thesis import definition
-from wam_studies.thesis.study import ExperimentRecord, measure, swept
+from wam_studies.thesis.measurement import ExperimentRecord, measure, swept
 
 SCENARIO = "demo_scenario"
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one

@@ -1,8 +1,7 @@
-"""Experiments and tasks on the harness: a case is an experiment, whose runs are recorded into bags and evaluated."""
+"""An experiment or a task is measured: its runs are recorded into bags and evaluated; also with many parameter sets."""
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -14,8 +13,6 @@ from wam_description.parameters import ParameterError
 from wam_description.wiring import raised
 from wam_sim.simulated_bag import record
 from wam_sim.sweep import Axis
-from wam_studies.harness import Study
-from wam_studies.scores import NONE_AT_ALL, Row, Scores, exact
 from wam_studies.thesis.definition import Experiment, configured
 from wam_studies.thesis.evaluation import evaluate
 from wam_studies.thesis.rows import Result
@@ -51,31 +48,6 @@ def measure(case: ExperimentCase) -> ExperimentRecord:
             return ExperimentRecord(experiment.name, f"unexpected {raised(error)}")
     # the curves of many sets would be too much to keep
     return ExperimentRecord(experiment.name, "", result if kept else result._replace(panels=()))
-
-
-@dataclass(frozen=True)
-class ExperimentStudy(Study[ExperimentCase, ExperimentRecord]):
-    """Whether what is measured in experiments is what is predicted; nothing is drawn from the seed."""
-
-    title = "experiments of the thesis, and whole-arm tasks"
-    page = "docs/experiments.md"
-    seeds = (1,)
-
-    chosen: tuple[ExperimentCase, ...] = ()
-
-    def cases(self, seed: int) -> Sequence[ExperimentCase]:
-        """Those that were chosen."""
-        return self.chosen
-
-    run = staticmethod(measure)
-
-    def score(self, records: Sequence[ExperimentRecord]) -> Scores:
-        """How many quantities of each experiment are outside of their bounds; none may be."""
-        rows = []
-        for name, _, result in records:
-            agree = [one.agrees for one in result.rows if one.is_claimed]
-            rows.append(Row(f"{name}, outside of bounds", exact(agree.count(False), len(agree)), required=NONE_AT_ALL))
-        return Scores(rows)
 
 
 def swept(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence[Any]]) -> list[ExperimentCase]:
