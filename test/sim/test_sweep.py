@@ -217,8 +217,9 @@ def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Pat
     """Cables that do not creep are measured as such, against a prediction that knows only their radii."""
     table, plot = tmp_path / "creep.csv", tmp_path / "creep.png"
     command = ["sweep", str(table), "--experiment", "creep", "--fresh", "--jobs", "1", "--picture", str(plot)]
+    guarded = ("guard.mode=limit", "joint_speed_limit=20", "force_gain=9.0")
     with pytest.raises(SystemExit, match="0"):
-        main([*command, "--vary", "driver:effects.creep=true,false"])
+        main([*command, *(f"--vary=force_loop:{one}" for one in guarded), "--vary", "driver:effects.creep=true,false"])
     with table.open() as stream:
         rows = list(csv.DictReader(stream))
     creeping, rigid = ([row for row in rows if row["driver:effects.creep"] == name] for name in ("True", "False"))
@@ -226,6 +227,7 @@ def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Pat
     predicted = [[float(row["predicted"]) for row in those] for those in (creeping, rigid)]
     assert predicted[0] == pytest.approx(predicted[1])
     assert all(row["agrees"] == "True" for row in creeping)
+    assert "out and back: the guard lowered it; used: force_gain [0.00" in creeping[0]["reported"]
     assert not any(row["agrees"] == "True" for row in rigid)
     assert all(abs(float(row["measured"])) < 0.01 * float(row["predicted"]) for row in rigid)
     assert plot.stat().st_size > 5000

@@ -138,7 +138,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tup
 
 
 def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
-    """Why each set failed, '' where it did not, and no report; a row of the table for each quantity, or the failure."""
+    """As `_of_scenario`, but a row of the table for each quantity, or the failure."""
     if given.config != BASE_CONFIGURATION or given.values:
         raise ValueError(
             "an experiment has its own configuration; leave out --config and --set, and change its numbers with --vary"
@@ -147,13 +147,14 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> t
     with batch_of(given, len(cases)) as batch:
         found = results(measure, cases, *batch)
     rows: list[tuple[Any, ...]] = []
-    for values, one in zip(sets, found, strict=True):
-        rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees) for c in one.result.rows]
-        rows += [(*values, one.failure, *[""] * 5)] if one.failure else []
-    _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees"), rows)
+    reported = ["; ".join(one.result.reported) for one in found]
+    for values, one, text in zip(sets, found, reported, strict=True):
+        rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees, text) for c in one.result.rows]
+        rows += [(*values, one.failure, *[""] * 6)] if one.failure else []
+    _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees", "reported"), rows)
     if given.picture:
         _experiment_figure(given.picture, axes, sets, found)
-    return [one.failure for one in found], []
+    return [one.failure for one in found], reported
 
 
 def _axis(text: str) -> Axis:

@@ -80,12 +80,16 @@ def _evaluate(experiment: Experiment, recordings: Runs) -> Result:
     result = function_of(experiment.evaluation)(recordings)
     runs = [run for run in experiment.runs if run.name in recordings]
     stops = [_stop(run, recordings[run.name]) for run in runs if run.stops or recordings[run.name].fault]
-    remarks = [
-        f"{name.replace('_', ' ')}: the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"
+    reported = tuple(
+        f"{name.replace('_', ' ')}: {text}"
         for name, run in recordings.items()
-        if run.fault
-    ]
-    return Result([*result.rows, *stops], result.panels, (*result.remarks, *remarks))
+        for value, text in (
+            (run.lowered, f"the guard lowered it; used: {run.lowered}"),
+            (run.fault, f"the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"),
+        )
+        if value
+    )
+    return result._replace(rows=[*result.rows, *stops], reported=reported)
 
 
 def _stop(run: Run, recorded: Recording) -> Comparison:
@@ -116,5 +120,5 @@ def function_of(evaluation: str) -> Evaluation:
 def text(experiment: Experiment, result: Result) -> str:
     """The result as plain text."""
     verdict = f"{'all' if result.agrees else 'NOT all'} quantities of this table are within their bounds"
-    remarks = "".join(f"\n{remark}" for remark in result.remarks)
+    remarks = "".join(f"\n{remark}" for remark in (*result.remarks, *result.reported))
     return f"{experiment.title} (section {experiment.section})\n\n{plain(result.rows)}\n{remarks}\n{verdict}"

@@ -97,6 +97,7 @@ class Recording(NamedTuple):
     fault : why the driver stopped, '' where it did not.
     fault_time : s, NaN where it did not.
     outcome : DONE, why the scenario failed, or the step in which the recording ended.
+    lowered : what the guard of the force loop lowered, '' where nothing.
     """
 
     bag: Bag
@@ -106,6 +107,7 @@ class Recording(NamedTuple):
     fault: str
     fault_time: float
     outcome: str
+    lowered: str = ""
 
     @property
     def shared(self) -> Shared:
@@ -213,7 +215,11 @@ def recording(path: Path) -> Recording:
     stamp, fault = run.faults[0] if run.faults else (0, "")
     outcome = run.outcome or next((step.name for step in run.begun[-1:]), "")
     fault_time = stamp / 1e9 if fault else float("nan")
-    return Recording(run.bag, run.namespace, run.parameters, _whole(steps, begin), fault, fault_time, outcome)
+    lowered = dict.fromkeys(status.facts.get("lowered", "nothing") for status in run.statuses)
+    return Recording(
+        run.bag, run.namespace, run.parameters, _whole(steps, begin), fault, fault_time, outcome,
+        "; ".join(one for one in lowered if one != "nothing"),
+    )  # fmt: skip
 
 
 def _whole(steps: tuple[Step, ...], begin: float) -> tuple[Step, ...]:

@@ -81,11 +81,12 @@ def noted(quantity: str, measured: SupportsFloat, unit: str) -> Comparison:
 
 
 class Result(NamedTuple):
-    """Result of an experiment."""
+    """Result of an experiment; `reported` is what the stack reported in its runs."""
 
     rows: Sequence[Comparison]
     panels: Sequence[Panel]
     remarks: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
 
     @property
     def agrees(self) -> bool:
