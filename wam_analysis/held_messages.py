@@ -1,6 +1,7 @@
 """Messages at other times: which is held, where a topic has none, and joints in the order of some names."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any
 
@@ -9,53 +10,54 @@ from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Index, Mask, Numbers, Times
-from wam_bag.bag import JointColumns
-from wam_description.arm import Arm
+from wam_bag.bag import BagError, JointColumns
+from wam_control.task.scenario import FORCE_LOOP
+from wam_description.arm import Arm, InputAges
 from wam_description.transmission_map import TransmissionMap
 from wam_sim.reactions import StepSpan
+from wam_sim.recorded_commands import COMMANDS
 from wam_sim.recorded_run import RecordedRun
 
 
-def held_for(stamps: Times) -> int:
+def held_of(run: RecordedRun, topic: str) -> int:
+    """For how long a message of a topic is held, ns; a command as long as the arm obeyed it, if that is known."""
+    with suppress(BagError):
+        if topic in COMMANDS:
+            return run.parameters.part(FORCE_LOOP, InputAges, "ages.").limit_ns("command")
+    return STREAM.held
+
+
+def held_for(stamps: Times, held: int = STREAM.held) -> int:
     """For how long a message of these is held, ns: `held`, or longer where a recording was thinned."""
-    return (
-        max(STREAM.held, STREAM.thinned * int(np.median(np.diff(stamps))))
-        if len(stamps) > STREAM.fewest
-        else STREAM.held
-    )
+    return max(held, STREAM.thinned * int(np.median(np.diff(stamps)))) if len(stamps) > STREAM.fewest else held
 
 
-def held_rows(stamps: Times, base: Times) -> tuple[Index, Mask]:
+def held_rows(stamps: Times, base: Times, held: int = STREAM.held) -> tuple[Index, Mask]:
     """Row of the last message at or before each instant, and whether there is one and it is still held."""
     row = row_at(stamps, base)
     age = base - stamps[row]
-    return row, (age >= 0) & (age <= held_for(stamps))
+    return row, (age >= 0) & (age <= held_for(stamps, held))
 
 
-def rows_before_gaps(stamps: Times) -> Index:
-    """Rows of the messages after which none comes for longer than one is held."""
-    return np.flatnonzero(np.diff(stamps) > held_for(stamps))
-
-
-def intervals(stamps: Times, changes: Mask) -> Iterator[tuple[int, int, int]]:
+def intervals(stamps: Times, changes: Mask, held: int) -> Iterator[tuple[int, int, int]]:
     """Row, begin and end, ns, of each time in which one command comes: until it changes, or does not come any more.
 
     Parameters
     ----------
     stamps : (n,), ns.
     changes : (n - 1,), whether each message but the first commands something else than the one before.
+    held : as for `held_for`.
     """
-    last = np.append(changes, True)
-    last[rows_before_gaps(stamps)] = True
+    last = np.append(changes | (np.diff(stamps) > held_for(stamps, held)), True)
     period = int(np.median(np.diff(stamps))) if len(stamps) > 1 else 0
     for first, after in pairwise([0, *(np.flatnonzero(last) + 1).tolist()]):
         yield first, int(stamps[first]), int(stamps[after - 1]) + period
 
 
-def with_holes(stamps: Times) -> Times:
+def with_holes(stamps: Times, held: int) -> Times:
     """These and, where none comes for longer than one is held, an instant at which it is not held any more."""
-    last = stamps[rows_before_gaps(stamps)]
-    return np.sort(np.concatenate([stamps, last + held_for(stamps) + 1])) if len(last) else stamps
+    held = held_for(stamps, held)
+    return np.sort(np.concatenate([stamps, stamps[:-1][np.diff(stamps) > held] + held + 1]))
 
 
 def by_names(columns: JointColumns | None, field: str, names: tuple[str, ...]) -> Numbers | None:

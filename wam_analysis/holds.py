@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import intervals, step_at
+from wam_analysis.held_messages import held_of, intervals, step_at
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers, Times
 from wam_control.force.contact_place import pinned_position
@@ -72,7 +72,7 @@ def tasks_of(run: RecordedRun, arm: Arm | None) -> list[RecordedTask]:
     every = list(tables(columns))
     changes = np.array([one != before for before, one in pairwise(map(str, every))], np.bool_)
     found = []
-    for row, begin, end in intervals(columns.stamp_ns, changes):
+    for row, begin, end in intervals(columns.stamp_ns, changes, held_of(run, "task_command")):
         with suppress(ParameterError):  # refused when it was commanded, too
             if (task := task_of(every[row], arm)) is not None:
                 found.append((task, begin, end))
@@ -129,7 +129,7 @@ def _commanded(run: RecordedRun) -> Iterator[Hold]:
         return
     frames = np.array(commands.frames)
     changed = np.any(np.abs(np.diff(commands.force, axis=0)) > HOLD.equal_force, axis=1) | (frames[1:] != frames[:-1])
-    for row, begin, end in intervals(commands.stamp_ns, changed):
+    for row, begin, end in intervals(commands.stamp_ns, changed, held_of(run, "force_command")):
         force, torque = (each[row] for each in (commands.force, commands.torque))
         command = ForceCommand(str(frames[row]), tuple(force.tolist()), tuple(torque.tolist()))
         _, position = pinned_position(command) or ("", math.nan)

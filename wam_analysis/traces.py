@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import held_rows, joint_angles, with_holes
+from wam_analysis.held_messages import held_of, held_rows, joint_angles, with_holes
 from wam_analysis.holds import Hold
 from wam_analysis.thresholds import TOUCH
 from wam_bag.arrays import Mask, Names, Numbers, Times
@@ -149,7 +149,7 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold]) -> Trace
         position, is_placed = np.full(len(base), NAN), np.zeros(len(base), bool)
         if forces is None:
             return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), position, is_placed)
-        row, known = held_rows(forces.stamp_ns, base)
+        row, known = held_rows(forces.stamp_ns, base, held_of(run, wrench))
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
         if (placed := _positions(run, point)) is not None:
             at, is_there = held_rows(placed[0], base)
@@ -160,7 +160,7 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold]) -> Trace
     base = np.empty(0, np.int64)
     for name in ("sim/contact/wrench", "contact/wrench", "force_command"):
         if (columns := run.wrench(name)) is not None:
-            base = with_holes(columns.stamp_ns)
+            base = with_holes(columns.stamp_ns, held_of(run, name))
             break
     commanded, measured = signal("force_command"), signal("force_measured")
     true = signal("sim/contact/wrench", "sim/contact/point")

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import held_rows, step_at
+from wam_analysis.held_messages import held_of, held_rows, step_at
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import NAN, Traces
 from wam_bag.arrays import Mask, Numbers
@@ -13,10 +13,10 @@ from wam_bag.bag import BagError
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.number_text import apart
+from wam_sim.recorded_commands import COMMANDS
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 
 LIMIT = "limits.contact_force"
-COMMANDS = ("force_command", "task_command", "sim/disturbance")  # the last is of a simulated arm
 
 
 class HardContact(NamedTuple):
@@ -114,7 +114,7 @@ def _planned(run: RecordedRun, traces: Traces) -> Mask:
     """Whether a force, a push or a task is commanded, or was until shortly before, (k,)."""
     acts = traces.commanded.acts | traces.push.acts
     if (columns := run.table("task_command")) is not None:
-        row, known = held_rows(columns.stamp_ns, traces.stamp)
+        row, known = held_rows(columns.stamp_ns, traces.stamp, held_of(run, "task_command"))
         acts |= known & np.isin(row, columns.message)  # a task with axes
     last = np.maximum.accumulate(np.where(acts, traces.stamp, 0))
     return (last > 0) & (traces.stamp - last <= TOUCH.bounce)
