@@ -21,7 +21,7 @@ from wam_description.configuration import Configuration
 from wam_description.defects import owners
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build_part
+from wam_description.parameters import ParameterError, build_part, require
 from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
@@ -134,13 +134,16 @@ def replay(
     inputs = [topic for topic in declaration.inputs if rows[topic].is_replayed]
     bag = read(path, [*inputs, *outputs, STATUS], may_lack=True)
     run = recorded_run(bag, namespace)
+    was = run.parameters
     # the node gets all that was sent, also what it refused
-    run = run._replace(bag=bag, parameters=run.parameters.with_options(values))
+    run = run._replace(bag=bag, parameters=was.with_options(values))
     _require_types(run, [rows[topic] for topic in (*inputs, *outputs)])
     triggers = (reaction.trigger.topic for reaction in declaration.reactions)
     if missing := next((trigger for trigger in triggers if run.columns(trigger) is None), ""):
         raise BagError(f"{path} lacks the topic {missing}, without which {declaration.name} does nothing")
     shared, own = _parameters(run, declaration, configuration)
+    period, recorded = shared.timing.period, was.shared.timing.period if was.nodes else shared.timing.period
+    require(period == recorded, f"timing.period is {period:g} s; in a replay it must be {recorded:g} s, as recorded")
     published = _run(run, shared, declaration, own)
     compared = []
     for topic in map(rows.__getitem__, outputs):

@@ -257,6 +257,7 @@ def test_a_parameter_that_cannot_be_set_is_refused_as_one_of_the_option(bag: Pat
         ("nonsense", 1.0, "--set nonsense: no node has parameter"),
         ("force_loop:force_gain", -1.0, "--set: parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
         ("timing.period", "fast", "--set: parameter 'timing.period' is 'fast'"),
+        ("timing.period", 0.002, "timing.period is 0.002 s; in a replay it must be 0.001 s, as recorded"),
     ):
         with pytest.raises(ParameterError, match=said):
             replay(bag, "gravity", values={name: value})
