@@ -97,9 +97,9 @@ class StackClient(Closing):
         """Ask a node and wait for its answer, for this time."""
         client, message = self.service(request)
         name = self.node.resolve_service_name(client.srv_name)
-        services = partial(self._services, request.node)
+        others = partial(self._others, request.node)
         try:
-            self._require(client.service_is_ready, f"no service {name}", services, seconds=seconds)
+            self._require(client.service_is_ready, f"no service {name}", others, seconds=seconds)
         except NoAnswerError as error:
             return Answer(False, str(error))
         attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
@@ -192,12 +192,12 @@ class StackClient(Closing):
         found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
         return [] if node in found else sorted(found - {self.node.get_name()})
 
-    def _services(self, node: str) -> list[str]:
-        """The services of a node that are called without values or with a switch, none where it is not there."""
+    def _others(self, node: str) -> list[str]:
+        """The services of a node that are called without values or with a switch; the nodes where it is not there."""
         with suppress(NodeNameNonExistentError):
             found = self.node.get_service_names_and_types_by_node(node, self.node.get_namespace())
             return sorted(name for name, (kind, *_) in found if kind.startswith("std_srvs/"))
-        return []
+        return self._nodes_without(node)
 
     def live(self, node: str, names: Collection[str]) -> list[str]:
         """Those of the parameters of a node that a request may change while it runs.
