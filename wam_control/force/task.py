@@ -68,8 +68,8 @@ class TaskAxis(NamedTuple):
         if self.joint >= 0:
             return f"{'torque' if self.kind is AxisKind.FORCE else kind} of joint {self.joint + 1}"
         x, y, z = self.direction
-        place = "the estimated position" if self.position is None else f"{self.position:.3g} m"
-        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place}{f' along {self.cover}' if self.cover else ''}"
+        at, on = ("", "on") if self.position is None else (f" at {self.position:.3g} m", "along")
+        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}){at}{f' {on} {self.cover}' if self.cover else ''}"
 
 
 class TaskCommand(NamedTuple):
