@@ -9,6 +9,7 @@ from wam_description.event import Code, Event
 from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
 from wam_description.signals import NodeStatus
+from wam_description.status import REFUSED
 
 REASONS: Final = {
     Reason.MOMENT_ONLY: "on this link only the moment is measured: the contact position is unknown, and the estimated "
@@ -216,7 +217,8 @@ def sentences(events: Iterable[Event], between: str = "; also: ") -> str:
 def news(status: NodeStatus, known: Collection[object]) -> str:
     """What a status states of other subjects than those that are known, for a terminal: a line for each event."""
     new = [one for one in status.events if one.subject not in known]
-    return sentences(new, "\n    also: ") or status.message
+    what = f"{status.facts[REFUSED]}: {new[0].code.words}: " if new and REFUSED in status.facts else ""
+    return what + (sentences(new, "\n    also: ") or status.message)
 
 
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:

@@ -20,7 +20,6 @@ from wam_description.event import Code, Event, Level, fault
 from wam_description.event_text import news, sentence
 from wam_description.interface import Feed, declared
 from wam_description.signals import NodeStatus
-from wam_description.status import REFUSED
 from wam_description.synchroniser import CURE, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Inputs, Outputs, mask, needed_arrays
@@ -186,8 +185,7 @@ class AdaptedNode(StackNode):
             self.get_logger().error(status.message)
         elif status.level is Level.WARN:
             if before is WAITING or not status.subjects <= before.subjects:
-                refused = f"{status.facts[REFUSED]}: refused: " if REFUSED in status.facts else ""
-                self.get_logger().warning(refused + news(status, before.subjects))
+                self.get_logger().warning(news(status, before.subjects))
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
 

@@ -6,7 +6,7 @@ import pytest
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_description.event import OBEYED, Code, Event, Level, fault, holding, refused, warning
-from wam_description.event_text import news, sentence, sentences
+from wam_description.event_text import news, sentence
 from wam_description.signals import BASE, NodeStatus
 from wam_description.status import pairs, parse, with_refused
 from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
@@ -63,10 +63,10 @@ def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: 
 
 
 def test_each_of_several_events_is_a_line_at_a_terminal_once() -> None:
-    late, end = refused("a", "no effect"), Event(Code.DONE)
-    status = NodeStatus(Level.WARN, sentences([late, end]) + "; commanded: 1", events=(late, end))
-    assert news(status, ()).splitlines() == ["no effect", "    also: done"]
-    assert news(status, {late.subject}) == "done"
+    late, end = refused("a", "no effect"), Event(Code.AT_LIMIT, values={"reason": "far"})
+    status = NodeStatus(Level.WARN, "no effect; also: far", facts={"refused": "a"}, events=(late, end))
+    assert news(status, ()).splitlines() == ["a: refused: no effect", "    also: far"]
+    assert news(status, {late.subject}) == "a: at limit: far"
 
 
 @pytest.mark.parametrize(
