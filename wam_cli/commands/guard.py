@@ -3,13 +3,14 @@
 import argparse
 import math
 
-from wam_cli.options import BASE_CONFIGURATION, PICTURE, configuration_of, take_configuration
+from wam_cli.options import BASE_CONFIGURATION, PICTURE, bounded, configuration_of, take_configuration
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
 from wam_stack import guard
 from wam_theory.loop_design import loop_design
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
+from wam_theory.thresholds import DESIGN
 
 PLANT = {  # option: what it is
     "inertia": "inertia of the driven link, kg m^2 or kg",
@@ -19,6 +20,7 @@ PLANT = {  # option: what it is
     "friction": "dynamic (Coulomb) friction, N m or N",
     "gain": "integral gain G_I, rad/s per N m or m/s per N",
 }
+FROM_ZERO, ABOVE_ZERO = bounded(float), bounded(float, 1.0 / DESIGN.absurd)
 SERVO = "velocity_loop"
 LEFT_OUT = ("margin here", "pose of margin here", "gains multiplied by", "lowered", "domain", "gains")  # in the message
 
@@ -31,13 +33,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "for a force loop of your own", "the first six are needed, all for a rotary or all for a linear loop:"
     )
     for name, text in PLANT.items():
-        own.add_argument(f"--{name}", type=float, help=text)
-    own.add_argument("--stiction", type=float, help="static friction, N m or N; default: the dynamic friction")
+        own.add_argument(f"--{name}", type=FROM_ZERO if name in ("damping", "friction") else ABOVE_ZERO, help=text)
+    own.add_argument("--stiction", type=FROM_ZERO, help="static friction, N m or N; default: the dynamic friction")
     own.add_argument(
-        "--limit", type=float, default=math.inf, help="bound of the force error (saturation), N m or N; default: none"
+        "--limit",
+        type=ABOVE_ZERO,
+        default=math.inf,
+        help="bound of the force error (saturation), N m or N; default: none",
     )
-    own.add_argument("--rate", type=float, default=0.0, help="sampling rate, Hz; default: 0, a continuous loop")
-    own.add_argument("--delay", type=float, default=0.0, help="delay from sample to command, s; default: 0")
+    own.add_argument("--rate", type=FROM_ZERO, default=0.0, help="sampling rate, Hz; default: 0, a continuous loop")
+    own.add_argument("--delay", type=FROM_ZERO, default=0.0, help="delay from sample to command, s; default: 0")
     own.add_argument(
         "--picture", type=PICTURE, help="draw the loop and the bound of stability into this PNG, PDF or SVG"
     )
