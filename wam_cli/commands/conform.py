@@ -108,7 +108,7 @@ def run(given: argparse.Namespace) -> int:
             raise ValueError(f"no driver publishes /{given.namespace}/motor_states; {cure}")
         timing = configuration.shared.timing
         set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
-        print(f"driver under test: {entry}")
+        print(f"driver under test: {entry}; it logs the faults that this test causes")
         started: list[NodeProcess] = []
 
         def start() -> None:
