@@ -5,7 +5,6 @@ import math
 
 from wam_cli.options import BASE_CONFIGURATION, PICTURE, bounded, configuration_of, take_configuration
 from wam_control.task.scenario import FORCE_LOOP
-from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
 from wam_stack import guard
 from wam_theory.loop_design import loop_design
@@ -56,20 +55,14 @@ def run(given: argparse.Namespace) -> int:
     ValueError
         for options of a loop of your own and of a configuration together, and a picture without a loop.
     """
-    is_own = any(getattr(given, name) is not None for name in PLANT)
-    if is_own and (given.config or given.values):
-        raise ValueError(f"--{', --'.join(PLANT)} describe a loop of your own; leave out --config and --set")
-    if given.config or given.values:
-        given.config = given.config or BASE_CONFIGURATION
-        return _assess_configuration(configuration_of(given))
-    if is_own:
+    if any(getattr(given, name) is not None for name in PLANT):
+        if given.config or given.values:
+            raise ValueError(f"--{', --'.join(PLANT)} describe a loop of your own; leave out --config and --set")
         return _assess(given)
     if given.picture:
         raise ValueError(f"--picture shows a loop of your own; give --{', --'.join(PLANT)}")
-    return _assess_configuration(Configuration.load(packaged(BASE_CONFIGURATION)))
-
-
-def _assess_configuration(configuration: Configuration) -> int:
+    given.config = given.config or BASE_CONFIGURATION
+    configuration = configuration_of(given)
     require_parameters(configuration)
     report = guard(configuration)
     facts = {name: value for name, value in report.facts.items() if name not in LEFT_OUT}
