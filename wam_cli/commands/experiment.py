@@ -74,20 +74,18 @@ def run(given: argparse.Namespace) -> int:
         raise ValueError("name an experiment, or give --all; --list prints the names")
     writable_directory(str(given.directory))
     chosen = list(map(load, names() if given.all else given.experiment))
-    directories = [_directory(given, one, len(chosen) == 1 and not given.all) for one in chosen]
-    cases = tuple(ExperimentCase(one, str(directory)) for one, directory in zip(chosen, directories, strict=True))
+    cases = [ExperimentCase(one, _directory(given, one, len(chosen) == 1 and not given.all)) for one in chosen]
     if given.evaluate:
-        records = [ExperimentRecord(one.name, "", evaluation.evaluate(one, Path(bags))) for one, bags in cases]
+        records = [ExperimentRecord("", evaluation.evaluate(one, Path(bags))) for one, bags in cases]
     else:
         with processes(min(given.jobs, len(cases))) as executor:
             records = results(measure, cases, executor, report=Progress("experiments", sys.stderr))
     found = []
-    for experiment, directory, record in zip(chosen, directories, records, strict=True):
-        result = record.result
-        if record.failure:
-            print(f"{record.name}: {record.failure}", file=sys.stderr)
+    for (experiment, directory), (failure, result) in zip(cases, records, strict=True):
+        if failure:
+            print(f"{experiment.name}: {failure}", file=sys.stderr)
             continue
-        picture = given.directory / f"{experiment.name}.png" if given.evaluate else directory / PICTURE
+        picture = given.directory / f"{experiment.name}.png" if given.evaluate else Path(directory, PICTURE)
         drawn = ""
         if result.panels:
             picture.parent.mkdir(parents=True, exist_ok=True)
@@ -100,12 +98,12 @@ def run(given: argparse.Namespace) -> int:
     return 2 if len(found) < len(records) else int(not all(result.agrees for _, result, _ in found))
 
 
-def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) -> Path:
+def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) -> str:
     """Where the bags of an experiment are."""
     if given.evaluate:
-        return Path(given.evaluate if is_one else given.evaluate / experiment.name)
+        return str(given.evaluate if is_one else given.evaluate / experiment.name)
     name = given.name or dated(experiment.name)
-    return Path(given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}"))
+    return str(given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}"))
 
 
 def _write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> None:

@@ -150,7 +150,7 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> t
     reported = ["; ".join(one.result.reported) for one in found]
     for values, one, text in zip(sets, found, reported, strict=True):
         rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees, text) for c in one.result.rows]
-        rows += [(*values, one.failure, *[""] * 6)] if one.failure else []
+        rows += [(*values, one.failure, *[""] * 6)] * bool(one.failure)
     _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees", "reported"), rows)
     if given.picture:
         _experiment_figure(given.picture, axes, sets, found)

@@ -78,16 +78,16 @@ def evaluate_sample(experiment: Experiment, recorded: Recording) -> Result:
 
 def _evaluate(experiment: Experiment, recordings: Runs) -> Result:
     result = function_of(experiment.evaluation)(recordings)
-    runs = [run for run in experiment.runs if run.name in recordings]
-    stops = [_stop(run, recordings[run.name]) for run in runs if run.stops or recordings[run.name].fault]
+    runs = [(run, recordings[run.name]) for run in experiment.runs if run.name in recordings]
+    stops = [_stop(run, found) for run, found in runs if run.stops or found.fault]
     reported = tuple(
         f"{name.replace('_', ' ')}: {text}"
         for name, run in recordings.items()
-        for value, text in (
-            (run.lowered, f"the guard lowered it; used: {run.lowered}"),
-            (run.fault, f"the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"),
+        for text in (
+            f"the guard lowered it; used: {run.lowered}" * bool(run.lowered),
+            f"the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}" * bool(run.fault),
         )
-        if value
+        if text
     )
     return result._replace(rows=[*result.rows, *stops], reported=reported)
 

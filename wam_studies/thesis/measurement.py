@@ -28,7 +28,6 @@ class ExperimentCase(NamedTuple):
 class ExperimentRecord(NamedTuple):
     """The result of an experiment, or why there is none."""
 
-    name: str
     failure: str
     result: Result = Result((), ())
 
@@ -43,11 +42,11 @@ def measure(case: ExperimentCase) -> ExperimentRecord:
                 record(configuration, load_for(configuration, f"{bag}.yaml"), bag)
             result = evaluate(experiment, Path(directory))
         except (ParameterError, BagError, RecordingError) as error:
-            return ExperimentRecord(experiment.name, str(error) if kept else str(error).replace(f"{directory}/", ""))
+            return ExperimentRecord(str(error) if kept else str(error).replace(f"{directory}/", ""))
         except Exception as error:
-            return ExperimentRecord(experiment.name, f"unexpected {raised(error)}")
+            return ExperimentRecord(f"unexpected {raised(error)}")
     # the curves of many sets would be too much to keep
-    return ExperimentRecord(experiment.name, "", result if kept else result._replace(panels=()))
+    return ExperimentRecord("", result if kept else result._replace(panels=()))
 
 
 def swept(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence[Any]]) -> list[ExperimentCase]:

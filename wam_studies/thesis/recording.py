@@ -212,14 +212,10 @@ def recording(path: Path) -> Recording:
         raise BagError(f"{path} has no topic 'status'; record it")
     steps = tuple(Step(step.name, step.begin / 1e9, step.end / 1e9, step.settings) for step in run.steps)
     begin = int(run.bag.metadata.get(CUT, {}).get("begin_ns", 0)) / 1e9
-    stamp, fault = run.faults[0] if run.faults else (0, "")
+    stamp, fault = run.faults[0] if run.faults else (np.nan, "")
     outcome = run.outcome or next((step.name for step in run.begun[-1:]), "")
-    fault_time = stamp / 1e9 if fault else float("nan")
-    lowered = dict.fromkeys(status.facts.get("lowered", "nothing") for status in run.statuses)
-    return Recording(
-        run.bag, run.namespace, run.parameters, _whole(steps, begin), fault, fault_time, outcome,
-        "; ".join(one for one in lowered if one != "nothing"),
-    )  # fmt: skip
+    lowered = "; ".join(sorted({status.facts.get("lowered", "nothing") for status in run.statuses} - {"nothing"}))
+    return Recording(run.bag, run.namespace, run.parameters, _whole(steps, begin), fault, stamp / 1e9, outcome, lowered)
 
 
 def _whole(steps: tuple[Step, ...], begin: float) -> tuple[Step, ...]:
