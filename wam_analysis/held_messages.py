@@ -48,8 +48,9 @@ def intervals(stamps: Times, changes: Mask, held: int) -> Iterator[tuple[int, in
     changes : (n - 1,), whether each message but the first commands something else than the one before.
     held : as for `held_for`.
     """
-    last = np.append(changes | (np.diff(stamps) > held_for(stamps, held)), True)
-    period = int(np.median(np.diff(stamps))) if len(stamps) > 1 else 0
+    steps = np.diff(stamps)
+    last = np.append(changes | (steps > held_for(stamps, held)), True)
+    period = int(np.median(steps)) if len(steps) else 0
     for first, after in pairwise([0, *(np.flatnonzero(last) + 1).tolist()]):
         yield first, int(stamps[first]), int(stamps[after - 1]) + period
 
