@@ -213,27 +213,31 @@ class AdaptedNode(StackNode):
     # what the other nodes report, live parameters, requests
 
     def take_status(self, status: NodeStatus) -> None:
-        """Follow the driver: forget what came before its session, and commands from before the brakes were switched."""
+        """Follow the driver, and hand the node the status of a peer."""
         if status.node not in self.peers.names:
             return
         if status.node == "driver":
-            self._is_enabled = status.mode == "enabled"
-            if status.session and status.session != self.health.session:
-                for synchroniser in self._synchronisers:
-                    synchroniser.follow(status.stamp)
-                self.inlets.restart()
-                awaited = {topic for one in self._synchronisers for topic in one.awaited(status.stamp)}
-                is_new = not self._worked and status.stamp > self.shared.timing.period_ns  # it lacks what came before
-                self.health.follow(status.session, None if is_new else sorted(awaited))
-            if status.since != self._since:
-                self._since = status.since
-                for synchroniser in self._synchronisers:
-                    synchroniser.discard_commands(status.since)
+            self._follow(status)
         take_status = getattr(self.node, "take_status", None)
         if take_status and (outputs := take_status(status)):
             self._publish(status.stamp, outputs)
             if getattr(self.node, "done", False):  # nobody may be there to answer its requests
                 self._requests.clear()
+
+    def _follow(self, driver: NodeStatus) -> None:
+        """Forget what came before the driver's session, and commands from before the brakes were switched."""
+        self._is_enabled = driver.mode == "enabled"
+        if driver.session and driver.session != self.health.session:
+            for synchroniser in self._synchronisers:
+                synchroniser.follow(driver.stamp)
+            self.inlets.restart()
+            awaited = {topic for one in self._synchronisers for topic in one.awaited(driver.stamp)}
+            is_new = not self._worked and driver.stamp > self.shared.timing.period_ns  # it lacks what came before
+            self.health.follow(driver.session, None if is_new else sorted(awaited))
+        if driver.since != self._since:
+            self._since = driver.since
+            for synchroniser in self._synchronisers:
+                synchroniser.discard_commands(driver.since)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """As that of rclpy; the reason of a success states what applies where the node has lowered something."""
