@@ -12,7 +12,6 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 import viser
-from numpy.typing import NDArray
 from viser.transforms import SO3
 
 from wam_analysis.drawing import (
@@ -26,6 +25,7 @@ from wam_analysis.drawing import (
     channels,
 )
 from wam_analysis.thresholds import LAYOUT
+from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 from wam_description.parameters import rows
 from wam_description.rigid_body import RigidBody
@@ -36,7 +36,6 @@ from wam_live.thresholds import LIVE
 
 ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one point
 
-Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]  # w x y z
 
 
@@ -44,9 +43,9 @@ class Grip(NamedTuple):
     """Where a drag holds a cover, m, in its frame: the point, and the ends of the axis of its tube, (3,) each."""
 
     cover: str
-    point: Array
-    start: Array
-    end: Array
+    point: Numbers
+    start: Numbers
+    end: Numbers
 
 
 class Drag(NamedTuple):
@@ -54,7 +53,7 @@ class Drag(NamedTuple):
 
     client: int
     grip: Grip
-    pointer: Array
+    pointer: Numbers
 
 
 class Scene:
@@ -115,7 +114,7 @@ class Scene:
         self._show_likely(snapshot.likely)
         self._show_hand()
 
-    def point(self, cover: str, place: float) -> Array:
+    def point(self, cover: str, place: float) -> Numbers:
         """Base coordinates, (3,), m, of a position along a cover."""
         return self._body.point(self._q, cover, (place, 0.0, 0.0))
 
@@ -205,7 +204,7 @@ class Scene:
 
     # dragging
 
-    def _dragged(self, cover: str, axis: tuple[Array, Array]) -> Callable[[Any], Any]:
+    def _dragged(self, cover: str, axis: tuple[Numbers, Numbers]) -> Callable[[Any], Any]:
         async def take(event: Any) -> None:  # an async callback: others run in a pool, out of order
             drag = self._drag
             is_own = drag is not None and (drag.client, drag.grip.cover) == (event.client_id, cover)
@@ -243,7 +242,7 @@ class Scene:
             self._band.head_length, self._band.head_radius = 0.22 * length, 0.06 * length
 
 
-def band_push(grip: Grip, pointer: Array) -> Wrench:
+def band_push(grip: Grip, pointer: Numbers) -> Wrench:
     """Push of a rubber band between where a cover is gripped and the pointer, (3,), m, in the cover's frame.
 
     It acts at the cover's axis, at the position of the grip along it, and across the axis only, as contacts do that the
@@ -265,14 +264,14 @@ def lit(colour: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def quaternion(rotation: Array) -> Quaternion:
+def quaternion(rotation: Numbers) -> Quaternion:
     """Quaternion w x y z of a rotation matrix; pinocchio's would lose 40 bytes of memory in each call."""
     w, x, y, z = SO3.from_matrix(rotation).wxyz.tolist()
     return w, x, y, z
 
 
-def turn_from_z(direction: Array) -> Array:
+def turn_from_z(direction: Numbers) -> Numbers:
     """A rotation matrix that turns z into a direction."""
     unit = np.asarray(direction, dtype=float) / float(np.linalg.norm(direction))
-    turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), unit).toRotationMatrix()
+    turned: Numbers = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), unit).toRotationMatrix()
     return turned

@@ -4,16 +4,14 @@ from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wam_bag.arrays import Mask
 from wam_bag.bag import Bag, BagError, JointColumns, TableColumns, WrenchColumns
 from wam_description.arm import Arm
 from wam_description.signals import BASE
 from wam_description.thresholds import INPUTS
 from wam_sim.recorded_parameters import RecordedParameters
 
-Times = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Commands = WrenchColumns | TableColumns
 
 PUSH = "sim/disturbance"  # whose stamp the driver does not use

@@ -32,7 +32,6 @@ from wam_sim.recorded_run import RecordedRun, recorded_run
 # fields of messages with three axes, and their units
 _FIELDS = {WRENCH: (("force.", "N"), ("torque.", "N m")), POINT: (("", "m"),)}
 NOTHING: Mapping[str, Any] = {}
-Numbers = JointColumns | WrenchColumns | PointColumns | TableColumns
 
 
 class Difference(NamedTuple):

@@ -136,11 +136,9 @@ def points(
     ParameterError
         where the configuration has no such parameter.
     """
-    found = []
-    for values in sets:
-        named = {axis.name: value for axis, value in zip(axes, values, strict=True)}
-        found.append(SweepPoint(configuration.with_values(named), tuple(steps)))
-    return found
+    names = [axis.name for axis in axes]
+    named = (dict(zip(names, values, strict=True)) for values in sets)
+    return [SweepPoint(configuration.with_values(values), tuple(steps)) for values in named]
 
 
 def outcome(point: SweepPoint) -> SweepResult:
