@@ -29,7 +29,6 @@ class MotionThresholds:
 class VelocityThresholds:
     """Which gains of the velocity loop are accepted, and what its amplifiers do."""
 
-    largest_scale: float = 1e3  # factor on the gains up to which a margin is searched
     # least damping ratio of a slow mode: what the integral gain alone holds swings on its spring
     least_damping: float = 0.03
     slow_mode: float = 0.6  # rad per period, up to which a mode is slow

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
@@ -37,8 +37,8 @@ def locked_rotors(
 def servo_period(
     rate: Array,
     inlet: Array,
-    proportional_gain: Sequence[float],
-    integral_gain: Sequence[float],
+    proportional_gain: ArrayLike,
+    integral_gain: ArrayLike,
     period: float,
     delay: int,
     by_difference: bool,

@@ -86,7 +86,8 @@ def predicted_limit(configuration: Configuration, held: bool, delay: int, by_dif
     shared = configuration.shared
     guard = ServoGuard(shared.arm, shared.timing, replace(GUARD, velocity_by_difference=by_difference))
     (mechanism,) = (m for m in guard._mechanisms if held == ("held" in m.what) and "joints at 0" not in m.what)
-    scale = largest_scale(lambda scale: is_stable(guard._period(mechanism, shared.servo, scale, scale, delay)), 100.0)
+    gains = np.array([shared.servo.proportional_gain, shared.servo.integral_gain])
+    scale = largest_scale(lambda scale: is_stable(guard._period(mechanism, *(scale * gains), delay)), 100.0)
     return scaled(shared.servo, scale)
 
 

@@ -96,8 +96,8 @@ class Dither:
         )
         if not self._torque:
             return DitherCost(0.0, heat)
-        body, inverse = RigidBody(arm), transmission.motor_from_joint
-        inertia = body.mass_matrix(q) + inverse.T @ np.diag(arm.motors.inertia) @ inverse + np.diag(arm.joints.armature)
+        body = RigidBody(arm)
+        inertia = body.mass_matrix(q) + transmission.at_joints(arm.motors.inertia) + np.diag(arm.joints.armature)
         efforts = np.array([transmission.joint_torques(torque) for torque in self._torque])
         moved = body.tool_jacobian(q) @ np.linalg.solve(inertia, efforts.T) / self._angular_frequency**2
         return DitherCost(2.0 * float(np.linalg.norm(moved, axis=0).max()), heat)

@@ -5,7 +5,7 @@ and with the links free.  Friction only takes energy away; without it the bound 
 are too small are stable, but hold nothing: both are assessed here alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -78,31 +78,24 @@ class ServoGuard:
         if self._parameters.mode == "off":
             return
         self._require_holding(servo)
-        if self._accepts(servo, 1.0, 1.0):
+        kp, ki = np.array(servo.proportional_gain), np.array(servo.integral_gain)
+        trouble = self._trouble(kp, ki)
+        if not trouble:
             return
-        kp, ki = servo.proportional_gain, servo.integral_gain
-        proportional = largest_scale(lambda scale: self._accepts(servo, scale, 1.0), 1.0)
-        integral = largest_scale(lambda scale: self._accepts(servo, 1.0, scale), 1.0)
+        proportional = largest_scale(lambda scale: not self._trouble(scale * kp, ki), 1.0)
+        integral = largest_scale(lambda scale: not self._trouble(kp, scale * ki), 1.0)
         ways = []
         if proportional and any(kp):
             ways.append(f"servo.proportional_gain up to {_listed(kp, proportional)} with this integral_gain")
         if integral and any(ki):
             ways.append(f"servo.integral_gain up to {_listed(ki, integral)} with this proportional_gain")
         if not ways:
-            alone = largest_scale(lambda scale: self._accepts(servo, scale, 0.0), 1.0)
+            alone = largest_scale(lambda scale: not self._trouble(scale * kp, 0.0 * ki), 1.0)
             ways.append(f"servo.proportional_gain up to {_listed(kp, alone)} with servo.integral_gain 0")
         raise ParameterError(
             f"servo.proportional_gain {_listed(kp)} with servo.integral_gain {_listed(ki)} is not stable: "
-            f"{self._trouble(servo)}; allowed: {', or '.join(ways)}"
+            f"{trouble}; allowed: {', or '.join(ways)}"
         )
-
-    def margin(self, servo: Servo) -> float:
-        """Largest factor on all gains, up to `VELOCITY.largest_scale`, that is stable with currents on time."""
-
-        def is_stable_at(scale: float) -> bool:
-            return all(is_stable(self._period(each, servo, scale, scale, 0)) for each in self._mechanisms)
-
-        return largest_scale(is_stable_at, VELOCITY.largest_scale)
 
     def _require_holding(self, servo: Servo) -> None:
         """Refuse proportional gains with which a motor at its largest speed is hardly braked.
@@ -124,37 +117,27 @@ class ServoGuard:
                 f"{_listed([rounded_up(each) for each in least])}, or a higher arm.joints.speed_limit",
             )
 
-    def _accepts(self, servo: Servo, proportional: float, integral: float) -> bool:
-        return not self._trouble(servo, proportional, integral)
-
-    def _trouble(self, servo: Servo, proportional: float = 1.0, integral: float = 1.0) -> str:
-        """Why gains, scaled, are not accepted; '' if they are."""
+    def _trouble(self, kp: Array, ki: Array) -> str:
+        """Why gains, (n,), are not accepted; '' if they are."""
         fraction = self._parameters.stability_fraction
         late = self._parameters.extra_delay if self._timing.mode == "realtime" else 0
         for mechanism in self._mechanisms:
-            found = least_damping(self._period(mechanism, servo, proportional, integral, 0), VELOCITY.slow_mode)
+            found = least_damping(self._period(mechanism, kp, ki, 0), VELOCITY.slow_mode)
             if found < VELOCITY.least_damping:
                 return (
                     f"an oscillation hardly decays with {mechanism.what}, its damping ratio is {found:.2g} "
                     f"(at least {VELOCITY.least_damping:g})"
                 )
             for scale, delay in sorted({(1.0, 0), (1.0 / fraction, 0), (1.0, late)}):
-                if not is_stable(self._period(mechanism, servo, scale * proportional, scale * integral, delay)):
+                if not is_stable(self._period(mechanism, scale * kp, scale * ki, delay)):
                     when = f"delayed by {delay} periods" if delay else "on time"
                     gains = f" and {scale:.3g} times these gains (velocity_loop:guard.stability_fraction)"
                     return f"an oscillation grows with {mechanism.what}, currents {when}{gains if scale > 1.0 else ''}"
         return ""
 
-    def _period(self, mechanism: Mechanism, servo: Servo, proportional: float, integral: float, delay: int) -> Array:
-        return servo_period(
-            mechanism.rate,
-            mechanism.inlet,
-            [proportional * gain for gain in servo.proportional_gain],
-            [integral * gain for gain in servo.integral_gain],
-            self._timing.period,
-            delay,
-            self._parameters.velocity_by_difference,
-        )
+    def _period(self, mechanism: Mechanism, kp: Array, ki: Array, delay: int) -> Array:
+        by_difference = self._parameters.velocity_by_difference
+        return servo_period(mechanism.rate, mechanism.inlet, kp, ki, self._timing.period, delay, by_difference)
 
     @cached_property
     def _mechanisms(self) -> tuple[Mechanism, ...]:
@@ -176,6 +159,6 @@ class ServoGuard:
         return tuple(found)
 
 
-def _listed(gains: Sequence[float], scale: float = 1.0) -> str:
+def _listed(gains: Iterable[float], scale: float = 1.0) -> str:
     """Gains times a scale, rounded down: a gain that is named as allowed has to be accepted."""
     return f"[{', '.join(f'{gain if scale == 1.0 else rounded_down(scale * gain):.3g}' for gain in gains)}]"

@@ -7,11 +7,11 @@ velocity or position loop in its place.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wam_control.velocity.transform import Transform
 from wam_description.arm import Shared
 from wam_description.parameters import lengths, parameter
 from wam_description.parts import Motors
 from wam_description.signals import State
+from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
@@ -47,7 +47,7 @@ class TorqueLoopNode:
     high_priority = True
 
     def __init__(self, shared: Shared, own: TorqueLoopParameters) -> None:
-        self._loop, self._transform = TorqueLoop(shared.arm.motors, own.gain), Transform(shared.arm)
+        self._loop, self._map = TorqueLoop(shared.arm.motors, own.gain), TransmissionMap.of(shared.arm)
         self._zero = [0.0] * len(shared.arm.motors.names)
         self.refusals: dict[str, str] = {}
 
@@ -69,5 +69,5 @@ class TorqueLoopNode:
                 "a velocity is commanded, which torque_loop does not control; set force_loop:mode open_loop"
             )
         wanted = effort.effort if effort else self._zero
-        sensed = self._transform.motor_effort(sensors.effort, self._zero) if sensors else wanted
+        sensed = self._map.motor_torques(sensors.effort) if sensors else wanted
         return {"motor_current_command": State([], [], self._loop.step(sensed, wanted))}

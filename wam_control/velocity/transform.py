@@ -18,28 +18,12 @@ class TransformParameters:
     )
 
 
-class CreepEstimate:
-    """Creep of each circuit at its motor, rad, along the motor's travel: the integral of loss tau |d theta|, (6.19).
-
-    Section 6.4.3; friction and acceleration of the rotors count as load, elastic stretch is not in it.  It starts at
-    zero, so joint angles are right where the motors were referenced.
-    """
-
-    def __init__(self, arm: Arm) -> None:
-        self._loss = [circuit.loss_per_torque for circuit in arm.circuits]
-        self._before: list[float] = []
-        self.creep = [0.0] * len(self._loss)
-
-    def step(self, theta: Sequence[float], tau: Sequence[float]) -> list[float]:
-        """Creep after the motors have turned to these angles (n,), rad, with these torques (n,), N m."""
-        for i, (angle, before) in enumerate(zip(theta, self._before or theta, strict=True)):
-            self.creep[i] += self._loss[i] * abs(angle - before) * tau[i]
-        self._before = list(theta)
-        return self.creep
-
-
 class Transform:
     """Motor states to joint states, joint commands to motor commands.
+
+    The creep of each circuit at its motor, rad, along the motor's travel, is the integral of loss tau |d theta|,
+    (6.19), section 6.4.3; friction and acceleration of the rotors count as load, elastic stretch is not in it.  It
+    starts at zero, so joint angles are right where the motors were referenced.
 
     Parameters
     ----------
@@ -49,14 +33,18 @@ class Transform:
 
     def __init__(self, arm: Arm, creep_correction: bool = False) -> None:
         self._map = TransmissionMap.of(arm)
-        self._creep = CreepEstimate(arm) if creep_correction else None
+        self._losses = [circuit.loss_per_torque for circuit in arm.circuits] if creep_correction else []
+        self._creep = [0.0] * len(self._losses)
+        self._before: list[float] = []
 
     def joint_state(self, motors: State) -> State:
         """Joint angles, velocities and torques (n,) that belong to those of the motors, cables not stretched."""
-        angles: Sequence[float] = motors.position
-        if self._creep is not None:
-            creep = self._creep.step(angles, motors.effort)
-            angles = [angle - crept for angle, crept in zip(angles, creep, strict=True)]
+        theta = angles = motors.position
+        if self._losses:
+            for i, (angle, before) in enumerate(zip(theta, self._before or theta, strict=True)):
+                self._creep[i] += self._losses[i] * abs(angle - before) * motors.effort[i]
+            self._before = theta
+            angles = [angle - crept for angle, crept in zip(theta, self._creep, strict=True)]
         return State(
             self._map.joint_positions(angles),
             self._map.joint_velocities(motors.velocity),

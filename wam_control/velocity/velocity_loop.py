@@ -39,7 +39,6 @@ class VelocityLoop:
     """
 
     def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
-        self._motors = motors
         self._limits = list(zip(motors.peak_torque, motors.torque_constant, strict=True))
         n = len(self._limits)
         self._integral, self._commanded, self._velocity, self._feedforward = ([0.0] * n for _ in range(4))
