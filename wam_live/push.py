@@ -1,8 +1,5 @@
 """A push of the simulated arm from outside the stack, as by hand."""
 
-from collections.abc import Mapping
-from functools import partial
-
 from wam_description.arm import Shared
 from wam_description.signals import BASE, ZERO, NodeStatus, Wrench
 from wam_description.status import PAUSED
@@ -32,8 +29,15 @@ def push(stack: StackClient, shared: Shared, wrench: Wrench, seconds: float) -> 
     statuses = stack.statuses
     hold = HeldTopic(stack.node, "sim/disturbance", shared)
     begin = stamp = 0
+
+    def check(silent: float) -> None:
+        if PAUSED in statuses["driver"].facts:
+            raise ValueError("the arm is paused; wam call resume")
+        if silent > CALL_LIMITS.silence:
+            raise ValueError(f"no joint_states for {CALL_LIMITS.silence:g} s")
+
     try:
-        for message in stack.messages("joint_states", partial(_raise_if_silent, statuses)):
+        for message in stack.messages("joint_states", check):
             driver = statuses["driver"]
             if driver.mode != "enabled":
                 raise ValueError(f"the arm is {_state(driver)}")
@@ -56,13 +60,6 @@ def release(hold: HeldTopic, stamp: int) -> None:
     if hold.is_on:
         hold.send(stamp, NO_PUSH)
         hold.end()
-
-
-def _raise_if_silent(statuses: Mapping[str, NodeStatus], silent: float) -> None:
-    if PAUSED in statuses["driver"].facts:
-        raise ValueError("the arm is paused; wam call resume")
-    if silent > CALL_LIMITS.silence:
-        raise ValueError(f"no joint_states for {CALL_LIMITS.silence:g} s")
 
 
 def _state(driver: NodeStatus) -> str:

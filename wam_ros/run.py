@@ -8,7 +8,7 @@ import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -241,6 +241,9 @@ def run(
     def is_over() -> bool:
         return stop.is_set or any(getattr(node, "done", False) for node in nodes.values())
 
+    def failure() -> str:
+        return next(filter(None, (str(getattr(node, "failure", "")) for node in nodes.values())), "")
+
     with connection:
         signal.signal(LISTENER_GONE, lambda *_: setattr(connection, "listener_gone", True))
         keep_to_processors(os.environ)  # all threads are there
@@ -249,10 +252,5 @@ def run(
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         connection.spin(is_over, end)
         before_end()
-        connection.context.failure = lambda: _failure(nodes.values())
-    return _failure(nodes.values())
-
-
-def _failure(nodes: Iterable[Node]) -> str:
-    """Why one of the nodes has failed, '' where none has."""
-    return next(filter(None, (str(getattr(node, "failure", "")) for node in nodes)), "")
+        connection.context.failure = failure
+    return failure()

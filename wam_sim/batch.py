@@ -55,12 +55,9 @@ def results(
         if the file belongs to another user, or is of another kind.
     """
     progress = report or (lambda done, of: None)
-    pieces = None if file is None else FinishedPieces(file)
+    pieces = FinishedPieces(file) if file else None
     keys = [key_of(function, given) for given in inputs] if pieces else []
-    found = dict[int, Output]()
-    for i, key in enumerate(keys):
-        if pieces is not None and (kept := pieces.get(key)) is not None:
-            found[i] = kept[0]
+    found: dict[int, Output] = {i: kept[0] for i, key in enumerate(keys) if pieces and (kept := pieces.get(key))}
     progress(len(found), len(inputs))
     pending: dict[Future[Output], int] = {}
     # `wait` locks all that is pending: a Ctrl-C in it would leave the locks to the thread that ends the pool
@@ -74,7 +71,7 @@ def results(
         while pending:
             i = pending.pop(future := done.get())
             found[i] = _result(future, inputs[i])
-            if pieces is not None:
+            if pieces:
                 pieces.add(keys[i], found[i])
             progress(len(found), len(inputs))
     finally:
