@@ -93,7 +93,7 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     text = f"Forces: {reached} of {len(held)} within {HOLD.force_tolerance:g} %"
     if errors:
         whose = "" if all(len(one.true) for one in controlled) else "measured "
-        text += f", largest {whose}error {apart(max(errors), HOLD.force_tolerance)} %"
+        text += f", largest {whose}error with ripple {apart(max(errors), HOLD.force_tolerance)} %"
     free = ", ".join(one.hold.name for one in known if not one.is_touching)
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 
