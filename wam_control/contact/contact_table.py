@@ -7,12 +7,6 @@ from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.model_prior import WAYS, friction_error, load_error
 from wam_description.arm import Arm
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table
-from wam_description.topics import HYPOTHESIS_COLUMNS
-
-_COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
-_LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "position", "position_sd"))
-_FORCE, _DIRECTION_SD = (_COLUMN[name] for name in ("force_x", "direction_sd"))
-_LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
 
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
@@ -36,16 +30,15 @@ def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
     """The contact of the most probable hypothesis; none without a row or a table."""
     if table is None or not table.rows:
         return NO_CONTACT
-    row = table.rows[0]
-    x, y, z = row[_FORCE : _FORCE + 3]
-    cover = covers[int(row[_LINK])]
-    return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD])
+    # in the order of `HYPOTHESIS_COLUMNS`
+    link, probability, position, position_sd, _, _, x, y, z, _, _, _, direction_sd, *_ = table.rows[0]
+    return Contact(covers[int(link)], position, (x, y, z), position_sd, probability, direction_sd)
 
 
 def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, ...]:
     """The parts of covers that hold the contact with 90 % probability in all."""
     rows = () if table is None else table.rows
-    parts = (LikelyRange(covers[int(row[_LINK])], row[_LOW], row[_HIGH]) for row in rows)
+    parts = (LikelyRange(covers[int(link)], low, high) for link, _, _, _, low, high, *_ in rows)
     return tuple(part for part in parts if part.low < part.high)
 
 
