@@ -206,14 +206,14 @@ def test_an_identified_model_gives_each_direction_its_friction_and_its_covarianc
             "model.covariance.values": np.diag(sd**2).ravel().tolist(),
         }
     ).shared
-    prior = model_prior(shared.model_arm, given, 0.1, shared.model)
+    prior = model_prior(shared.model_arm, given, shared.model)
     by_name = dict(zip(prior.names, prior.errors, strict=True))
     assert by_name["friction of motor1 in positive motion"] == pytest.approx(0.05 / 0.045 - 1.0)
     assert by_name["friction of motor1 in negative motion"] == pytest.approx(0.04 / 0.045 - 1.0)
     assert by_name["friction of motor2 in negative motion"] == pytest.approx(0.0, abs=1e-12)
     first = prior.names.index("friction of motor1 in positive motion")
     assert np.sqrt(prior.covariance[first, first]) == pytest.approx(np.hypot(0.001 / 0.045, 0.02))
-    wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
+    wide = model_prior(WAM, given, CONFIGURATION.shared.model)
     assert wide.covariance[first, first] > 10.0 * prior.covariance[first, first]
     assert np.array_equal(wide.limit, prior.limit), "friction may drift from what was identified"
 
@@ -236,7 +236,7 @@ def test_the_identified_covariance_is_that_of_masses_and_load_too_with_what_they
             "model.covariance.values": covariance.ravel().tolist(),
         }
     ).shared
-    prior = model_prior(shared.model_arm, given, 0.1, shared.model)
+    prior = model_prior(shared.model_arm, given, shared.model)
     motor, joint = WAM.motors.dynamic_friction[1], WAM.joints.dynamic_friction[1]
     at = [
         prior.names.index(name)
@@ -253,7 +253,7 @@ def test_the_identified_covariance_is_that_of_masses_and_load_too_with_what_they
     assert prior.errors[at] == pytest.approx([0.0, 0.0, 0.0, 0.03, 0.0, 0.0])
     assert prior.limit[at[3:]] == pytest.approx(prior.covariance[at[3:], at[3:]]), "of these only friction drifts"
     others = np.delete(np.arange(len(prior.names)), at)
-    wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
+    wide = model_prior(WAM, given, CONFIGURATION.shared.model)
     assert np.array_equal(prior.covariance[np.ix_(others, others)], wide.covariance[np.ix_(others, others)])
     assert not prior.covariance[np.ix_(at, others)].any()
 

@@ -19,7 +19,6 @@ from wam_description.event import Event
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
 from wam_description.reasons import NO_REASON, Reason
-from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.small_matrices import inverse
 
@@ -107,13 +106,10 @@ class ContactEstimator:
             f"it must be at least two periods, {2.0 * timing.period:g} s",
         )
         self._parameters = parameters
-        self._observer = MomentumObserver(
-            arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle, model
-        )
         cycle = 0 if parameters.use_joint_sensors else timing.dither_cycle
+        self._observer = MomentumObserver(arm, parameters.observer, parameters.use_joint_sensors, cycle, model)
         self._delay = parameters.observer.time_constant + 0.5 * cycle * timing.period  # s, of the torques
-        body = RigidBody(arm, parameters.observer.mass_scale)
-        self._inference = ContactInference(arm, body, parameters.inference)
+        self._inference = ContactInference(arm, self._observer.body, parameters.inference)
         self._is_blind = False
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
         self.refused = 0

@@ -6,7 +6,6 @@ moment only.
 """
 
 import math
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -146,9 +145,7 @@ class ContactInference:
             one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
         given, links = self._parameters, len(self._covers)
-        if (size := sum(precision.diagonal().tolist())) > (10.0 * CONTACT.smallest_sd) ** -2:
-            now = None  # together they would be as exact
-        if size > CONTACT.smallest_sd**-2:
+        if sum(precision.diagonal().tolist()) > CONTACT.smallest_sd**-2:
             precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(precision)))
         self.jacobians = np.array([self._body.cover_jacobian(q, cover.name) for cover in self._covers])
         rows = np.zeros((links + 1, 7, len(precision)))  # the last are those of a payload
@@ -193,8 +190,9 @@ class ContactInference:
         place = end if is_unknown else fit.position
         f1, f2 = fit.force_at_end if is_unknown else fit.force
         share = (place - start) / (end - start)
-        force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.across])
-        point = _triple([first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)])
+        fx, fy, fz = [f1 * e1 + f2 * e2 for e1, e2 in cover.across]
+        point = [first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)]
+        force = fx, fy, fz
         return Hypothesis(
             cover=cover.name,
             probability=fit.probability,
@@ -250,10 +248,6 @@ class ContactInference:
         size = float(np.linalg.norm(force))
         out_of_plane = abs(float(force @ hinge)) / size if size > 0.0 else 1.0
         return math.sqrt(max(0.0, 1.0 - out_of_plane**2)), cosine, math.sqrt(1.0 - cosine**2)
-
-
-def _triple(values: Sequence[float]) -> Triple:
-    return values[0], values[1], values[2]
 
 
 def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:

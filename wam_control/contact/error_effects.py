@@ -49,10 +49,9 @@ class LinkEffects:
         n = len(masses)
         self.body, tool = body, np.array(arm.tool)
         inertia = tool @ tool * np.eye(3) - np.outer(tool, tool)
-        self._per_error = np.zeros((10 * n, 3 * n + 1))
-        for i, mass in enumerate(masses):
-            self._per_error[10 * i + 1 : 10 * i + 4, 3 * i : 3 * i + 3] = -mass * np.eye(3)
-        self._per_error[10 * n - 10 :, -1] = -np.array([1.0, *tool, *inertia[INERTIA]])
+        centres = np.kron(np.diag(-masses), np.eye(10, 3, -1))
+        load = np.concatenate((np.zeros(10 * n - 10), [-1.0], -tool, -inertia[INERTIA]))
+        self._per_error = np.column_stack((centres, load))
 
     def of(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
         """Torques, (n, 3 n + 1), per m of the centres' coordinates in the frames of their links, and per kg."""
@@ -69,10 +68,7 @@ class GaugeEffects:
 
     def observation(self, motion: FilteredMotion, *_: object) -> Observation:
         """See `ErrorEffects.observation`."""
-        n = len(motion.model)
-        effects = np.zeros((n, 4 * n + 1))
-        effects.ravel()[:: 4 * n + 2] = motion.model  # the diagonal
-        effects[:, n:] = self._links.of(motion.pose, self._still, self._still)
+        effects = np.hstack((np.diag(motion.model), self._links.of(motion.pose, self._still, self._still)))
         residual = motion.residual - self._payload * effects[:, -1]
         moving = motion.signals  # there are none
         return Observation(residual, effects, self._rest, moving, motion.pose, self._lasting)
@@ -84,24 +80,15 @@ class ErrorEffects:
     Parameters
     ----------
     side : motors, cables and their nominal friction.
-    parameters : the uncertainty of the nominal model.
     times : time constants of the observer's filters, s.
-    has_dither : whether torques and signals are means over a cycle of a dither.
     links : effects of centres of mass and payload.
     """
 
-    def __init__(
-        self,
-        side: MotorSide,
-        parameters: ObserverParameters,
-        times: Sequence[float],
-        has_dither: bool,
-        links: LinkEffects,
-    ) -> None:
-        self._side, inverse, friction = side, side.map.motor_from_joint, side.friction
+    def __init__(self, side: MotorSide, times: Sequence[float], links: LinkEffects) -> None:
+        self._side, inverse, friction, given = side, side.map.motor_from_joint, side.friction, side.parameters
         n = self._n = len(inverse)
-        self._from_motors, self._parameters, self._times = side.map.joint_from_motor, parameters, times
-        self._sds = parameters.rest_uncertainty * friction.static, parameters.shape_uncertainty * friction.static
+        self._from_motors, self._times, self._links = side.map.joint_from_motor, times, links
+        self._sds = given.rest_uncertainty * friction.static, given.shape_uncertainty * friction.static
         self._dynamic, levels = friction.dynamic, 0.5 * friction.dynamic
         through = self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
         # the same of the errors of the model per signal
@@ -110,7 +97,7 @@ class ErrorEffects:
         driven = self._from_motors != 0.0
         common = (driven.T.astype(float) @ driven > 0.0).astype(float) * side.is_identified
         self._differs = np.eye(n) - common / np.maximum(1.0, common.sum(axis=1))
-        self._to_joints, self._has_dither, self._links = inverse.T, has_dither, links
+        self._to_joints = inverse.T
 
     def observation(self, motion: FilteredMotion, inertia: Array, which: int) -> Observation:
         """The residual, the effects of the errors on it, and the covariance of the rest.
@@ -121,13 +108,13 @@ class ErrorEffects:
         inertia : (n, n), kg m^2.
         which : of the filters.
         """
-        n, given, time = self._n, self._parameters, self._times[which]
+        n, given, time = self._n, self._side.parameters, self._times[which]
         residual, model, signals = motion.residual, motion.model, motion.signals
         at = 2 * n * len(LOG_DISTANCES)
         by_distance = signals[:at].reshape(2 * n, -1)
         moving, resting, slow, loaded = signals[at : at + 8 * n].reshape(4, -1)
         sliding = by_distance.dot(EQUAL)
-        if self._has_dither:
+        if self._side.has_dither:  # torques and signals are means over a cycle
             # a shaft that slips in both directions within a cycle passes at its stops from one limit of its friction to
             # the other: what it slips further in one of them is all that is left of both
             uneven = np.abs(sliding)
@@ -141,15 +128,16 @@ class ErrorEffects:
         )
         modelled = self._from_motors.T.dot(model)
         weights = self._links.body.gravity_torque(motion.pose)
-        effects = np.zeros((n, 14 * n + 2))
-        sizes = np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded))
-        np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
-        own = modelled[:, None] * self._differs
-        own.ravel()[:: n + 1] -= self._from_motors.T.dot(residual)  # the diagonal
-        effects[:, 8 * n : 9 * n] = self._to_joints.dot(own)
-        effects[:, 9 * n : 11 * n] = self._through * (-self._dynamic * slope)
-        effects[:, 11 * n] = self._to_joints.dot(signals[-n:])
-        effects[:, 11 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
+        constants = modelled[:, None] * self._differs - np.diag(self._from_motors.T.dot(residual))
+        effects = np.hstack(
+            (
+                self._errors * np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded)),
+                self._to_joints.dot(constants),
+                self._through * (-self._dynamic * slope),
+                self._to_joints.dot(signals[-n:])[:, None],
+                self._links.of(motion.pose, motion.velocity, motion.acceleration),
+            )
+        )
         residual = residual - given.payload[0] * effects[:, -1]
         at_rest, shape = self._sds
         variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved

@@ -115,6 +115,11 @@ class ModelErrors:
         covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest
         return seen.residual - effects.dot(self.errors), self._with_noise(covariance, seen)
 
+    def external(self, seen: Observation) -> tuple[Array, Array]:
+        """The same, with the covariance as large as the errors in free motion are."""
+        torques, covariance = self.corrected(seen)
+        return torques, self.size * covariance
+
     def zero(self, seen: Observation) -> None:
         """Take a moment at rest as one of an arm that nothing touches.
 
@@ -140,9 +145,7 @@ class ModelErrors:
     def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
         """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
-        k, size = len(self.errors), len(effects[0])
-        covariance = np.zeros((size, size))
-        covariance.ravel()[:: size + 1] = 1.0  # the diagonal
+        k, covariance = len(self.errors), np.eye(len(effects[0]))
         covariance[:k, :k] = self.covariance
         return effects, self.size * covariance, self.size * self._with_noise(seen.rest, seen)
 

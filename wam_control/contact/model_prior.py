@@ -49,19 +49,21 @@ def load_error(shaft: str) -> str:
 
 
 def model_prior(
-    arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None, use_joint_sensors: bool = False
+    arm: Arm, given: ObserverParameters, model: ArmModel | None, use_joint_sensors: bool = False
 ) -> ModelPrior:
     """The errors of the model of an arm; joint sensors show those of masses, centres of mass and payload alone.
 
     Parameters
     ----------
     arm, given : the arm as modelled, and how certain that is.
-    payload_sd : kg.
     model : the identified one, if there is any.
     use_joint_sensors : whether the torques are those of joint sensors.
     """
     n, shafts, joints = len(arm.joints.names), [*arm.motors.names, *arm.joints.names], arm.joints.names
     # the load friction of a joint that one motor drives is that of the motor
+    low, high = given.payload
+    # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
+    payload_sd = (high - low) / math.sqrt(3.0) if high or use_joint_sensors else given.payload_uncertainty
     driven_by = np.count_nonzero(TransmissionMap.of(arm).joint_from_motor, axis=1)
     loads = [*[given.load_uncertainty] * n, *np.where(driven_by > 1, given.load_uncertainty, 0.0)]
     # of each kind: names, standard deviations, what is tolerable
@@ -90,7 +92,7 @@ def model_prior(
             given.centre_uncertainty,
             CONTACT.tolerable_centre,
         ),
-        (["payload"], payload_sd, CONTACT.tolerable_payload + given.payload[1] - given.payload[0]),
+        (["payload"], payload_sd, CONTACT.tolerable_payload + high - low),
     ]
     if use_joint_sensors:
         kinds = [kinds[1], *kinds[7:]]

@@ -5,6 +5,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from operator import sub
 from typing import Final
 
@@ -15,7 +16,7 @@ from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import ErrorEffects, FilteredMotion, GaugeEffects, LinkEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
-from wam_control.contact.motor_side import LinkMotion, MotorSide
+from wam_control.contact.motor_side import JointSample, LinkMotion, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
@@ -48,7 +49,7 @@ class MomentumObserver:
     masses and an unknown payload are tracked (`ModelErrors`).
 
     A dither of the motor torques (velocity loop) keeps the shafts moving: torques and fractions are
-    averaged over the last `dither_cycle` samples, one whole cycle, in which the sign of friction and
+    averaged over the last `cycle` samples, one whole cycle, in which the sign of friction and
     the dither itself cancel.
 
     Parameters
@@ -56,11 +57,12 @@ class MomentumObserver:
     arm : the arm as configured.
     parameters : the nominal model and its uncertainty.
     use_joint_sensors : whether samples are the joint sensors', else the motors'.
-    dither_cycle : samples in a cycle of the dither, 0 where there is none.
+    cycle : samples in a cycle of the dither, 0 where there is none and with joint sensors.
     model : the identified model with its covariance, of which `arm` has the means; None for none.
 
     Attributes
     ----------
+    body : links of the nominal model.
     age : s, since the first sample.
     seen : the moment of which torques were last given.
     """
@@ -70,7 +72,7 @@ class MomentumObserver:
         arm: Arm,
         parameters: ObserverParameters,
         use_joint_sensors: bool,
-        dither_cycle: int = 0,
+        cycle: int = 0,
         model: ArmModel | None = None,
     ) -> None:
         n = len(arm.joints.names)
@@ -79,26 +81,18 @@ class MomentumObserver:
             f"parameter 'observer.mass_scale' has {len(parameters.mass_scale)} values; {n} links need {n}",
         )
         self._n, self._parameters = n, parameters
-        self._body = RigidBody(arm, parameters.mass_scale)
-        cycle = 0 if use_joint_sensors else dither_cycle
+        self.body = RigidBody(arm, parameters.mass_scale)
         self._side = side = MotorSide(arm, parameters, cycle > 0, model)
         self._is_link_side = use_joint_sensors
         fast, times = parameters.detection_time, [parameters.time_constant]
         if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not cycle:
             times.append(fast)
-        low, high = parameters.payload
-        # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
-        payload_sd = (high - low) / math.sqrt(3.0)
-        if not high and not use_joint_sensors:
-            payload_sd = parameters.payload_uncertainty
-        self._may_carry = payload_sd > 0.0 or high > 0.0
-        links = LinkEffects(arm, self._body, np.multiply(arm.links.mass, parameters.mass_scale))
+        links = LinkEffects(arm, self.body, np.multiply(arm.links.mass, parameters.mass_scale))
         self._effects: GaugeEffects | ErrorEffects = (
-            GaugeEffects(n, parameters, links)
-            if use_joint_sensors
-            else ErrorEffects(side, parameters, times, cycle > 0, links)
+            GaugeEffects(n, parameters, links) if use_joint_sensors else ErrorEffects(side, times, links)
         )
-        prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
+        prior = model_prior(arm, parameters, model, use_joint_sensors)
+        self._may_carry = prior.limit[-1] > 0.0 or parameters.payload[1] > 0.0
         noise = (parameters.motor_noise * side.friction.dynamic[:n]) ** 2
         self._errors = ModelErrors(
             prior, parameters.drift, side.map.motor_from_joint.T, noise, parameters.motor_torque_sd**2
@@ -156,19 +150,17 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(position, velocity, effort, [], NO_SIGNALS, dt)
+            return self._update(JointSample(position, velocity, effort, [], NO_SIGNALS, dt))
         if self._side.carries_nothing(state):
             self.reset()
             return True
         sample = self._side.take(state, dt + self._gap)
         self._gap = 0.0
-        return sample is None or self._update(*sample)
+        return sample is None or self._update(sample)
 
-    def _update(
-        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, dt: float
-    ) -> bool:
-        """Take a sample of the joints, see `JointSample`."""
-        body, at, speed, last = self._body, np.array(q), np.array(qd), self._last
+    def _update(self, sample: JointSample) -> bool:
+        q, qd, tau, friction, signals, dt = sample
+        body, at, speed, last = self.body, np.array(q), np.array(qd), self._last
         span, inertia, links = dt + self._gap, body.mass_matrix(at), None
         if self._is_link_side:
             momentum = inertia.dot(speed).tolist()
@@ -206,8 +198,7 @@ class MomentumObserver:
         if not self._is_link_side:
             self._side.expect()
         self.seen = self._observation()
-        torques, covariance = self._errors.corrected(self.seen)
-        return torques, self._errors.size * covariance
+        return self._errors.external(self.seen)
 
     def moment(self, torques: Array) -> Torques:
         """The external torques last given, (n,), N m, with what is known of their errors."""
@@ -217,8 +208,7 @@ class MomentumObserver:
         """The same with `detection_time`, for a faster detection; None where there is none."""
         if len(self._filters.times) == 1:
             return None
-        torques, covariance = self._errors.corrected(self._observation(1))
-        return torques, self._errors.size * covariance
+        return self._errors.external(self._observation(1))
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
@@ -280,6 +270,7 @@ def _low_pass(before: list[float], present: list[float], keep: float) -> list[fl
     return [keep * old + take * new for old, new in zip(before, present)]  # noqa: B905 - as above
 
 
+@dataclass
 class _Sample:
     """The last sample that was taken.
 
@@ -293,18 +284,13 @@ class _Sample:
     links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
-    def __init__(
-        self,
-        q: list[float],
-        qd: list[float],
-        momentum: list[float],
-        inertia: Array,
-        known: list[float],
-        bias: list[float],
-        links: LinkMotion | None,
-    ) -> None:
-        self.q, self.qd, self.momentum, self.inertia = q, qd, momentum, inertia
-        self.known, self.bias, self.links = known, bias, links
+    q: list[float]
+    qd: list[float]
+    momentum: list[float]
+    inertia: Array
+    known: list[float]
+    bias: list[float]
+    links: LinkMotion | None
 
 
 class _Filters:

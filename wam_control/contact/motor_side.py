@@ -61,6 +61,7 @@ class MotorSide:
 
     Attributes
     ----------
+    parameters, has_dither : as given.
     map : between motors and joints.
     velocity : of the motors.
     is_identified : whether the model is that of a recording.
@@ -76,7 +77,7 @@ class MotorSide:
         self.is_identified = model is not None and model.is_identified
         self.friction = ShaftFriction(arm, parameters, model)
         self.velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
-        self._parameters, self._has_dither = parameters, has_dither
+        self.parameters, self.has_dither = parameters, has_dither
         self._torque: Array | None = None
 
     def reset(self) -> None:
@@ -92,7 +93,7 @@ class MotorSide:
 
     def carries_nothing(self, state: State) -> bool:
         """Whether brakes or stiction hold the motors, which are at rest without current."""
-        return not any(state.effort) and max(map(abs, state.velocity)) < self._parameters.motor_rest_velocity
+        return not any(state.effort) and max(map(abs, state.velocity)) < self.parameters.motor_rest_velocity
 
     def take(self, state: State, dt: float) -> JointSample | None:
         """Take a state of the motors `dt` seconds after the one before; None while velocities are not known."""
@@ -102,7 +103,7 @@ class MotorSide:
         (theta, thetad, tau_motor), dt = fitted
         q, qd = self.map.joint_positions(theta), self.map.joint_velocities(thetad)
         # with dither a shaft stops at both ends of each swing, held there by the external torque
-        keep = 0.0 if self._has_dither else math.exp(-dt / self._parameters.friction_memory)
+        keep = 0.0 if self.has_dither else math.exp(-dt / self.parameters.friction_memory)
         motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)
         at_shafts: list[float] = motion.friction.tolist()
         through = self.map.joint_torques(at_shafts[:n])
