@@ -25,23 +25,25 @@ def stick_section(recording: AnalysedRecording) -> Section:
         found = sticking(one, command if is_speed else None, least) if one.is_joint else None
         if found is None:
             continue
-        if not found.slips and (distance := hidden_motion(one)):
-            far = shown(distance, one.units["position"])
+        position = one.only("position").values.get("position", np.zeros(1))
+        if not found.begins and found.shortest and np.ptp(position) > SHAFT.joint_rest * SHAFT.way:
+            far = shown(float(np.ptp(position)), one.units["position"])
             sentences.append(
                 f"{one.label}: moved by {far}, more slowly than the noise of its velocity, or too briefly."
             )
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
-            Finding(f"{one.label}: motions", "", float(found.slips)),
+            Finding(f"{one.label}: motions", "", float(len(found.begins))),
         ]
         sentence = f"{one.label}: {found.words}"
-        if recording.is_foreign and found.stuck and 0 < found.slips == len(found.begins):  # ours have the arm's time
-            begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.begins]] + ["..."] * (found.slips > LAYOUT.begins)
+        if recording.is_foreign and found.stuck and found.begins:  # ours have the arm's time
+            begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.begins]]
+            begins += ["..."] * (len(found.begins) > LAYOUT.begins)
             sentence += f" (from {', '.join(begins)} s)"
-        if recording.is_foreign and found.stuck and found.slips and found.slowest:
-            sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
-        if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
+            if found.slowest:
+                sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
+        if found.commanded > SHAFT.disobeyed and len(found.begins) > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
@@ -55,15 +57,13 @@ class Sticking(NamedTuple):
     Attributes
     ----------
     stuck : fraction of the time at rest.
-    slips : motions between; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
-    begins : when each motion began, s.
-    shortest : rest that is counted, s.
+    begins : when each motion began, s; a motion back and forth is one.
+    shortest : rest that is counted, s; 0 where it never moved.
     slowest : speed in rad/s or m/s up to which it is at rest, where the noise hides slower motions; else 0.
     """
 
     stuck: float
-    slips: int
     commanded: float
     begins: tuple[float, ...] = ()
     shortest: float = 0.0
@@ -72,23 +72,25 @@ class Sticking(NamedTuple):
     @property
     def words(self) -> str:
         """How much of the time it was at rest, and how often it moved."""
-        if not self.slips:
+        if not self.begins:
             return "never moved"
         counted = f"rests shorter than {shown(self.shortest, 's')} do not count"
-        if not self.stuck and self.slips == 1:
+        if not self.stuck and len(self.begins) == 1:
             return f"always in motion ({counted})"
-        return f"at rest for {100.0 * self.stuck:.0f} % of the time ({counted}), moved {times(self.slips)}"
+        return f"at rest for {100.0 * self.stuck:.0f} % of the time ({counted}), moved {times(len(self.begins))}"
 
 
 def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
     """Rest and motion of a joint, which is at rest below a least speed; None without a velocity."""
     if rests(source):
-        return Sticking(1.0, 0, math.nan)
-    resting = motions = total = disobeyed = 0
-    shortest, slowest = 0.0, 0.0
+        return Sticking(1.0, math.nan)
+    resting = total = disobeyed = 0
+    shortest = slowest = ended = 0.0
+    place = math.nan  # where the last piece ended in motion
     begins: list[float] = []
     placed = source.only("position")
-    sd = resolution(placed.values["position"]) if len(placed.time) else 0.0
+    positions = placed.values.get("position", np.zeros(0))
+    sd = resolution(positions)
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
         rest, velocity = rest_speed(piece, least), piece.values["velocity"]
@@ -97,22 +99,19 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         still = at_rest(velocity, rest, least_rows)
         total += len(still)
         shortest = max(shortest, max(least_rows, SHAFT.rest_samples) * piece.period)
-        at = np.interp(piece.time, placed.time, placed.values["position"]) if len(placed.time) else None
-        still = without_turns(still, velocity, rest, at, sd)
-        started = piece.time[runs(~still)[:, 0]].tolist()
-        resting, motions, begins = resting + int(np.sum(still)), motions + len(started), begins + started
+        at = np.interp(piece.time, placed.time, positions) if len(positions) else None
+        still = without_turns(still, velocity, rest, at, sd, piece.period)
+        first = runs(~still)[:, 0]
+        goes_on = at is not None and abs(at[0] - place) > rest * (piece.time[0] - ended)  # over a gap, in motion
+        place, ended = math.nan if at is None or still[-1] else at[-1], piece.time[-1]
+        begins += piece.time[first[first >= goes_on]].tolist()
+        resting += int(np.sum(still))
         if command is not None:
             disobeyed += int(np.sum(still & (np.abs(_commanded_speed(command, piece.time)) > rest)))
     if not total:
         return None
     unmet = disobeyed / resting if command is not None and resting else math.nan
-    return Sticking(resting / total, motions, unmet, tuple(begins), shortest, slowest)
-
-
-def hidden_motion(source: Source) -> float:
-    """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
-    distance = float(np.ptp(source.only("position").values.get("position", np.zeros(1))))
-    return distance if distance > SHAFT.joint_rest * SHAFT.way and not rests(source) else 0.0
+    return Sticking(resting / total, unmet, tuple(begins), shortest, slowest)
 
 
 def rest_speed(piece: Piece, least: float) -> float:

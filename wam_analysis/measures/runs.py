@@ -112,12 +112,13 @@ def at_rest(velocity: Numbers, rest: float, shortest: int) -> Mask:
 
 
 def without_turns(
-    still: Mask, velocity: Numbers, rest: float, position: Numbers | None = None, sd: float = 0.0
+    still: Mask, velocity: Numbers, rest: float, position: Numbers | None = None, sd: float = 0.0, period: float = 1.0
 ) -> Mask:
     """The rests without those in which a smooth motion only turns back or is slow, as a slow sine does.
 
     Such a motion passes through the speeds of rest evenly, or does not come near zero; a shaft that sticks is at zero
-    for most of the time, and then leaves its place faster than a parabola would.
+    for most of the time, and then leaves its place faster than a parabola would.  Nor does it rest where its position
+    moves faster, as where slow velocities are recorded as zero.
 
     Parameters
     ----------
@@ -125,10 +126,13 @@ def without_turns(
     velocity : (n,), rad/s or m/s.
     rest : speed up to which it was counted as at rest.
     position, sd : (n,), and the standard deviation of its noise, which hides a turn; None for the way of the velocity.
+    period : s from sample to sample.
     """
-    at = np.cumsum(velocity) if position is None else position
+    at = np.cumsum(velocity) * period if position is None else position
 
     def sticks(begin: int, end: int) -> bool:
+        if np.ptp(np.percentile(at[begin:end], (5.0, 95.0))) > rest * period * (end - begin) + SHAFT.noisy * sd:
+            return False
         if not begin or end == len(velocity):
             return end - begin >= SHAFT.rest_samples
         quiet = begin + np.flatnonzero(np.abs(velocity[begin:end]) <= SHAFT.passing * rest)
