@@ -45,6 +45,7 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             if cycle is None:
                 continue
             flat = without_drift(time, value, cycle.period)
+            flat = without_drift(time, flat, cycle.period)  # what the first mean leaves of a strong slow motion
             first, last = _extended(time, flat, rows, cycle.period, free)
             lag = cycle.period / float(time[1] - time[0])
             edge = round(CYCLE.edge * lag)
@@ -52,7 +53,7 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             if inner.stop - inner.start < CYCLE.episode_cycles * lag:
                 inner = slice(first, last)  # with its ends within the recording
             period = _refined(time[inner], flat[inner], cycle.period)
-            both = [_cycle(time[inner], signal[inner], least, period) for signal in (value, flat)]
+            both = (_cycle(time[inner], signal[inner], least, period) for signal in (value, flat))
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
             goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
             if goes_on or (better is None and _changes(time[inner], flat[inner], period)):
