@@ -111,7 +111,7 @@ def contradiction(source: Source) -> str:
     if abs(factor - 1.0) > SHAFT.agree:
         return (
             f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "
-            "sign"
+            "sign, or is of another joint"
         )
     lost = (_lost_way(piece, source.units["position"]) for piece in pieces(source, "position", "velocity"))
     return next(filter(None, lost), "")
@@ -224,7 +224,7 @@ def _own_acceleration(
     acceleration = np.convolve(velocity, kernel, "same")
     rows = (np.abs(velocity) > rest) & np.isfinite(acceleration) & np.all(np.isfinite(load), axis=1)
     rows[:width] = rows[-width:] = False  # the mean is incomplete
-    if np.count_nonzero(rows) < SHAFT.fewest_samples:
+    if np.count_nonzero(rows) < SHAFT.fewest_samples or not np.any(acceleration[rows]):
         return 0.0, 1.0, 0.0
     curve = np.nansum(np.convolve(acceleration, kernel, "same")[rows] ** 2) / np.sum(acceleration[rows] ** 2)
     columns, wanted = np.column_stack([np.ones(np.count_nonzero(rows)), load[rows]]), acceleration[rows]

@@ -48,8 +48,8 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
     if isinstance(columns, JointColumns) and len(columns.stamp_ns):
         yield f"{name}: {len(columns.stamp_ns)} messages; joints: {', '.join(columns.names)}."
         numbers = np.hstack([columns.position, columns.velocity, columns.effort])
-        known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
-        if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
+        number = len(columns.names)
+        if none := [joint for i, joint in enumerate(columns.names) if not np.isfinite(numbers[:, i::number]).any()]:
             yield f"{name}: {', '.join(none)} without a value that is a number."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
         sizes = np.sqrt(np.nansum(columns.force**2, axis=1))[np.isfinite(columns.force).any(axis=1)]
@@ -121,7 +121,6 @@ def _treated(found: Sequence[Source]) -> list[str]:
             size=shown(abs(treated.size), those[0].units.get(quantities[0], "s")),
             factor=treated.size,
             times=times(treated.number),
-            share=treated.of - treated.number,
         )
         sentences.append(f"{subject}: {words}.")
     return sentences
@@ -129,15 +128,14 @@ def _treated(found: Sequence[Source]) -> list[str]:
 
 def _alike(found: Sequence[Source]) -> list[str]:
     """How to name the command among several topics with the same joints: their values do not show it."""
-    topics: dict[str, list[str]] = {}
-    for one in found:
-        if one.is_joint and not one.is_command:
-            topics.setdefault(one.name, []).append(one.topic)
-    shared = {tuple(dict.fromkeys(some)): joint for joint, some in topics.items() if len({*some}) > 1}
     if any(one.is_command for one in found):
         return []
+    topics: dict[str, dict[str, None]] = {}
+    for one in found:
+        topics.setdefault(one.name, {})[one.topic] = None
+    shared = {tuple(some): joint for joint, some in topics.items() if joint and len(some) > 1}
     return [
-        f"{joint} is in {' and '.join(some)}; if one of them is the command, give --command {some[-1]}."
+        f"{joint} is in {' and '.join(some)}; if one of them is the command, name it with --command."
         for some, joint in shared.items()
     ]
 

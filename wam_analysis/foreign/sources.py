@@ -36,7 +36,7 @@ class Treatment(StrEnum):
     LATE = "the {quantity} is about {size}, as by a filter; the rate of the position is used"
     SCALED = "the {quantity} is {factor:.3g} times the rate of the position; that rate is used"
     SPIKES = "the {quantity} jumps away and back {times}, by up to {size}; the mean of its neighbours is used"
-    SPARSE = "{quantity} in only {share} of {of} messages"
+    SPARSE = "{quantity} in only {number} of {of} messages"
 
 
 class Treated(NamedTuple):
@@ -46,7 +46,7 @@ class Treated(NamedTuple):
     ----------
     what : the kind.
     quantity : of which, '' for the messages.
-    number, of : how many, of all; 0 where it is the whole.
+    number, of : how many, of all; 0 where it is not stated.
     size : of a wrap, or the largest of the jumps, in the unit of the quantity; s, to which stamps are rounded; of a
         velocity, per rate of the position.
     """
@@ -117,8 +117,7 @@ class Source(NamedTuple):
 
     def leaves(self, begin: float) -> float:
         """When its sender goes over to another frame after an instant, s; infinite if it does not."""
-        later = self.away[self.away > begin]
-        return float(later[0]) if len(later) else math.inf
+        return float(np.min(self.away[self.away > begin], initial=math.inf))
 
 
 class Piece(NamedTuple):
@@ -281,7 +280,7 @@ def alternates(source: Source) -> bool:
         values = source.only(quantity).values[quantity]
         if len(values) < SHAFT.fewest_samples:
             continue
-        before, last, here, then, after = (values[i : len(values) - 4 + i] for i in range(5))
+        before, last, here, then, after = sliding_window_view(values, 5).T
         once = np.minimum(np.abs(here - last), np.abs(then - here))
         near = [
             np.minimum(np.abs(far - here), np.abs(far - next_to)) for far, next_to in ((before, last), (after, then))
@@ -326,28 +325,28 @@ def _treated(one: Source) -> Source:
         if not one.is_command and (number := int(np.sum(held := _held_over(value)))):
             values[quantity] = np.where(held, math.nan, value)
             treated.append(Treated(Treatment.HELD, quantity, number, len(value)))
-        elif lacking := int(np.sum(~np.isfinite(value))):
-            treated.append(Treated(Treatment.SPARSE, quantity, lacking, len(value)))
+        elif (number := int(np.sum(np.isfinite(value)))) < len(value):
+            treated.append(Treated(Treatment.SPARSE, quantity, number, len(value)))
     if "position" in values and one.units["position"] == "rad":
         known = np.isfinite(values["position"])
         unwrapped, wraps, turn = _unwrapped(one.time[known], values["position"][known], one.is_command)
         if wraps:
             values["position"] = values["position"].copy()
             values["position"][known] = unwrapped
-            treated.append(Treated(Treatment.WRAPPED, "position", wraps, len(unwrapped), turn))
+            treated.append(Treated(Treatment.WRAPPED, "position", wraps, size=turn))
     for quantity, value in values.items():
         if not one.is_command and len(rows := _spikes(value)):
             values[quantity] = value.copy()
             values[quantity][rows] = 0.5 * (value[rows - 1] + value[rows + 1])
             size = np.max(np.abs(value - values[quantity])[rows])
-            treated.append(Treated(Treatment.SPIKES, quantity, len(rows), len(value), size))
+            treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
     if "position" in values and not one.is_command:
         shown = one._replace(values=values).only("position", "velocity")
         jumps = _jumps(shown)
         if len(sizes := jumps[jumps != 0.0]):
             whole = np.cumsum(jumps)[row_at(shown.time, one.time)]
             values["position"] = values["position"] - whole
-            treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
+            treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
     factor, unfit = velocity_fit(one._replace(values=values))
     if unfit and not one.is_command:
         del values["velocity"]
@@ -432,7 +431,7 @@ def _jumps(shown: Source) -> Numbers:
         finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
     rest = steps - moved
     usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
-    least = max(STREAM.beyond * np.max(np.abs(moved)), usual, SHAFT.joint_rest)
+    least = np.maximum(STREAM.beyond * np.abs(moved), max(usual, SHAFT.joint_rest))
     jumps = (np.abs(rest) > least) & ~after_gaps(shown.time)[1:]
     result[1:][jumps] = rest[jumps]
     return result
@@ -443,9 +442,8 @@ def _labelled(found: list[Source]) -> list[Source]:
     result = []
     for one in found:
         others = [two for two in found if two is not one and two.name == one.name]
-        label = one.name if one.name and not any(two.is_command == one.is_command for two in others) else one.topic
-        if one.name and label == one.topic:
-            label = f"{one.topic} {one.name}"
+        is_alone = not any(two.is_command == one.is_command for two in others)
+        label = one.name * is_alone or f"{one.topic} {one.name}".rstrip()
         if any(two.topic == one.topic for two in others):
             label += f" ({one.frame or 'no frame'})"
         result.append(one._replace(label=label))

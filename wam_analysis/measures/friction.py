@@ -191,7 +191,7 @@ def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half:
     inverse = np.linalg.pinv(products)
     freedom = max(len(a) / width - len(used), SHAFT.freedom)
     covariance = inverse * float(np.sum(rest[keep] ** 2)) / freedom
-    noisy = _few(freedom) * np.sqrt(np.diag(covariance))
+    noisy = _few(freedom) * np.sqrt(np.abs(np.diag(covariance)))
     noisy[_undetermined(products)] = math.inf
     found, errors = np.full(len(scale), math.nan), np.full(len(scale), math.nan)
     found[used] = solution / scale[used]
