@@ -77,8 +77,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
             value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
             before = value[(piece.time < begin) & (piece.time >= begin - HOLD.before)]
             after = (piece.time >= begin) & (piece.time < end)
-            is_known = len(before) or begin == measured.time[0]
-            if not is_known or np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
+            if np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
             response = _response(piece.time[after] - begin, value[after], before, size)
             found.append(ForceStep(measured.label, begin, float(last @ way), float(desired[row] @ way), response))
@@ -86,7 +85,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
 
 
 def _response(time: Numbers, value: Numbers, before: Numbers, size: float) -> StepResponse:
-    """Of a force to a step of a size; the steady state alone where it was reached before the step or the recording."""
+    """Of a force to a step of a size; the steady state alone where what was before, or the rise, was not recorded."""
     steady = HOLD.steady * float(time[-1])
     tail = value[time >= time[-1] - steady]
     if not len(before) or abs(np.mean(tail) - np.mean(before)) < HOLD.loud * size:
