@@ -67,6 +67,12 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
     return np.asarray(np.rint(BILLION * seconds), np.int64)
 
 
+def joined_times(seconds: NDArray[Any], rest: NDArray[Any]) -> NDArray[Any]:
+    """Times, ns, of whole seconds and a rest, which is less than a second in its unit: ms, us or ns."""
+    digits = len(f"{np.nanmax(rest):.0f}")
+    return BILLION * seconds + 10 ** (3 * max((9 - digits) // 3, 0)) * rest
+
+
 def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Clock]:
     """The times of each topic, on the clock of the stamped topic with the most messages.
 
@@ -77,8 +83,7 @@ def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Cloc
     found = {}
     for topic, columns in topics.items():
         times = rising(columns.stamp_ns, columns.log_time_ns)
-        is_own = np.array_equal(times, columns.stamp_ns)
-        found[topic] = Clock(times, "" if is_own else CLOCK_SET)
+        found[topic] = Clock(times, CLOCK_SET * (not np.array_equal(times, columns.stamp_ns)))
     stamped = [topic for topic, clock in found.items() if not clock.note] or list(found)
     first = max(stamped, key=lambda topic: len(found[topic].times), default="")
     for topic, columns in topics.items():

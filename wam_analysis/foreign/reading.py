@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wam_analysis.foreign.clocks import BILLION, nanoseconds
+from wam_analysis.foreign.clocks import BILLION, joined_times, nanoseconds
 from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
@@ -154,8 +154,8 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
         return columns.log_time_ns
     if "," in path:
-        seconds, parts = (np.vstack(_numbers(topic, columns, field))[:, 0] for field in path.split(",", 1))
-        return BILLION * seconds.astype(np.int64) + parts.astype(np.int64)
+        parts = (np.vstack(_numbers(topic, columns, field))[:, 0].astype(np.int64) for field in path.split(",", 1))
+        return joined_times(*parts)
     stamps = [_at(topic, message, path) for message in columns.messages]
     for whole, rest in PARTS_OF_TIME:
         if hasattr(stamps[0], whole) and hasattr(stamps[0], rest):

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.foreign.clocks import BILLION, nanoseconds
+from wam_analysis.foreign.clocks import joined_times, nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
@@ -138,14 +138,14 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
 
 
 def _with_one_time(series: Mapping[str, Any], given: TopicMap) -> tuple[Mapping[str, Any], TopicMap]:
-    """A table whose time is in two columns, s and ns, with one column of it, ns, and a map that has its unit."""
+    """A table whose time is in two columns, s and a rest, with one column of it, ns, and a map that has its unit."""
     title = given.fields.get("stamp", "")
     parts = title.split(",")
-    if title in series or len(parts) != 2 or not all(part in series for part in parts):
+    if len(parts) != 2 or not all(part in series for part in parts):
         return series, given
-    seconds, rest = (_numbers(series[part]) for part in parts)
+    times = joined_times(*(_numbers(series[part]) for part in parts))
     others = {name: column for name, column in series.items() if name not in parts}
-    return {title: BILLION * seconds + rest, **others}, given._replace(units={**given.units, "stamp": UNITS["ns"]})
+    return {title: times, **others}, given._replace(units={**given.units, "stamp": UNITS["ns"]})
 
 
 def _topics(
