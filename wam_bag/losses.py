@@ -140,10 +140,9 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
     is_part = not counts or CUT in metadata or _is_one_of_several(path, metadata)
     if is_part:
         received = Counter()
-    missing = {topic: count - counts.get(topic, 0) for topic, count in sorted(received.items())}
     return Losses(
         repaired,
-        {topic: count for topic, count in missing.items() if count > 0},
+        dict(sorted((received - Counter(counts)).items())),
         lost[DROPPED],
         bool(counts) and PARAMETERS in attachments and not recording,
         lost[LOST_AT_END],
@@ -187,7 +186,7 @@ def _seconds(stamp: int, first: int) -> str:
 
 
 def _counted(messages: Mapping[str, int]) -> str:
-    most = sorted(messages.items(), key=lambda item: (-item[1], item[0]))
+    most = sorted(messages.items(), key=lambda item: (-item[1], item))
     listed = [f"{count} of {topic}" for topic, count in most[: READING_LIMITS.named]]
     if others := most[READING_LIMITS.named :]:
         listed.append(f"{sum(count for _, count in others)} of {len(others)} other topics")

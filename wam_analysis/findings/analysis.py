@@ -213,8 +213,7 @@ def _foreign_line(recording: AnalysedRecording) -> str:
 def happened_section(recording: AnalysedRecording) -> Section:
     """What happened, in a few sentences."""
     run, zero = recording.run, recording.traces.zero
-    faults = [f"driver fault at {(one.stamp - zero) / 1e9:.2f} s: {one.reason}" for one in run.faults]
-    faults = list(dict.fromkeys(faults))
+    faults = [*dict.fromkeys(f"driver fault at {(one.stamp - zero) / 1e9:.2f} s: {one.reason}" for one in run.faults)]
     wrong = [stated(run.others)] if run.others else []
     wrong += [f"INCOMPLETE: {line}" for line in recording.lost]
     wrong += [f"REFUSED: {one.sentence}." for one in run.refused]

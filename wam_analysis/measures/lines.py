@@ -42,7 +42,7 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
         is_clear = not found or (len(found) < most and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
         if k < CYCLE.first_line or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
             continue
-        if power[k] < sure * _nearest(power, k) or power[k] < sure * _noise(power, k):
+        if power[k] < sure * max(_nearest(power, k), _noise(power, k)):
             continue
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
