@@ -291,12 +291,7 @@ def test_mismatch_scales_and_added_friction_adds_under_every_law(name: str) -> N
     friction, velocity = EVERY_LAW[name], 0.1
     parameters = CONFIGURATION.node("driver", DriverParameters).mismatch
     double = dataclasses.replace(
-        parameters,
-        mass=(1.0,),
-        motor_friction=(1.0,),
-        joint_friction=(2.0,),
-        stiffness=(1.0,),
-        torque_constant=(1.0,),
+        parameters, mass=(1.0,), motor_friction=(1.0,), joint_friction=(2.0,), stiffness=(1.0,), torque_constant=(1.0,)
     )
     plain = joint_friction_at(velocity, friction)
     arm = with_friction(joint=(STATIC, DYNAMIC))

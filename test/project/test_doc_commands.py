@@ -95,10 +95,7 @@ def test_code_in_the_pages_is_as_the_project_writes_it() -> None:
 def test_a_block_without_a_mark_is_noticed() -> None:
     assert unmarked(
         [Block("", "sh", "wam demo\n"), Block("", "", "wam up\n"), Block("not run here: why", "sh", "x\n")]
-    ) == [
-        "wam demo\n",
-        "wam up\n",
-    ]
+    ) == ["wam demo\n", "wam up\n"]
     assert unmarked([Block("", "text", "  driver\n")]) == []
 
 

@@ -223,11 +223,7 @@ def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) 
     (tmp_path / "slow.py").write_text(SLOW)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
-        [sys.executable, "slow.py"],
-        cwd=tmp_path,
-        env=environment,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
+        [sys.executable, "slow.py"], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, start_new_session=True
     ) as process:
         try:
             while not (

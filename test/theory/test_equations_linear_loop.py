@@ -15,11 +15,7 @@ def state_matrices(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """x, v and the integral of the error, for x_m = G_I integral + G_P error; F_c is the output."""
     a = np.array(
-        [
-            [0.0, 1.0, 0.0],
-            [-(ktr + kc + ktr * proportional * kc) / j, -b / j, ktr * gain / j],
-            [-kc, 0.0, 0.0],
-        ]
+        [[0.0, 1.0, 0.0], [-(ktr + kc + ktr * proportional * kc) / j, -b / j, ktr * gain / j], [-kc, 0.0, 0.0]]
     )
     return a, np.array([0.0, ktr * proportional / j, 1.0]), np.array([kc, 0.0, 0.0])
 
