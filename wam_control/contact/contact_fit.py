@@ -330,10 +330,7 @@ class ContactFit:
                     unused = width * (passed - enough) / weight
                     below = 0.5 if math.isnan(part.low) else float(x > part.low)
                     low, high = low + (1.0 - below) * unused, high - below * unused
-                if not part.low <= low:  # of a NaN, too
-                    part.low = low
-                if not part.high >= high:
-                    part.high = high
+                part.low, part.high = min(low, part.low), max(high, part.high)  # in this order never a NaN
         return parts, total
 
     def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, left: float) -> Fit:

@@ -162,32 +162,29 @@ class ContactFusion:
             self._past = self._of(list(moments), now, np.array(guess)) if moments else None
 
     def _of(self, moments: list[_Seen], now: Torques, guess: Array) -> _Past:
-        n, last = len(now.residual), moments[-1].torques
-        effects = np.concatenate([moment.torques.effects for moment in moments])
+        n, past, last = len(now.residual), [moment.torques for moment in moments], moments[-1].torques
+        effects = np.concatenate([each.effects for each in past])
         shared = effects.dot(last.covariance)
         common = shared.dot(effects.T)
         places, chances = guess[:, 0], np.sqrt(guess[:, 1])
-        found, count = len(places), len(moments)
-        rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
-        for j, moment in enumerate(moments):
-            rows[:, :, j] = moment.rows
+        found, count = len(places), len(past)
+        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
         sides, slopes = _sides(rows[:found, :, -1:], places)
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
         forces = np.linalg.solve(levers, (present @ last.residual)[..., None])[..., 0]  # (links, 3), N
-        moved = CONTACT.slip * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
-        elapsed = np.array([now.time + CONTACT.moves_on - moment.torques.time for moment in moments])
+        moved = CONTACT.slip * np.abs(np.array([each.pose for each in past]) - now.pose).max(axis=1)
+        elapsed = np.array([now.time + CONTACT.moves_on - each.time for each in past])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
         ways = (moved + self._speed * elapsed).tolist()
         sizes = [
-            _grown(moment.torques.residual, last.residual, certain, way * slope)
-            for moment, way in zip(moments, ways, strict=True)
+            _grown(each.residual, last.residual, certain, way * slope) for each, way in zip(past, ways, strict=True)
         ]
         rows[:, 1:] *= np.array(sizes)[:, None]
         sides, slopes = _sides(rows[:found], places)
-        for j, moment in enumerate(moments):
-            common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
+        for j, each in enumerate(past):
+            common[n * j : n * j + n, n * j : n * j + n] += each.own
         covariance = common.copy()
         turned = sides * (chances * CONTACT.force_turn * np.sqrt((forces**2).sum(axis=1)))[:, None, None, None]
         for j in range(count):
@@ -204,7 +201,7 @@ class ContactFusion:
             )
         )
         slides = probability_of_slide(
-            np.concatenate([moment.torques.residual for moment in moments]),
+            np.concatenate([each.residual for each in past]),
             self._widening * (covariance + unknown.T.dot(unknown)),
             CONTACT.slide_speed * (per_metre[link] * elapsed[:, None]).reshape(-1),
         )
