@@ -235,4 +235,4 @@ def guarded(recorded: PredictionParameters, press: PressedPoint, surface: float)
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
     posture = posture_of(touches[0]._replace(q=tuple(np.round(press.q, 3))))
-    return Guarded(guard.assess(task_of(loop), touches), parameters.contact_stiffness, posture)
+    return Guarded(guard.assess(task_of(loop), tuple(touches)), parameters.contact_stiffness, posture)

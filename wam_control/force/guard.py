@@ -28,7 +28,14 @@ from wam_description.parameters import require
 from wam_description.transmission_map import TransmissionMap
 
 UNKNOWN: Final = "at `worst case`, until a force is commanded"
-Triple = tuple[float, float, float]
+
+
+class Report(NamedTuple):
+    """One line, whether it is a warning, and the numbers behind it by name."""
+
+    message: str
+    is_warning: bool
+    facts: dict[str, str]
 
 
 class Supervision:
@@ -73,38 +80,63 @@ class Supervision:
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
         self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, arm.joints.names)
         self.lowered = _lowered(parameters, self.parameters)
-        self._report()
+        self.report = self._report()
 
     def _judge(self, postures: Sequence[tuple[float, ...]]) -> None:
-        guard, parameters = self._guard, self.parameters
-        position_sd = parameters.contact_position_sd
-        contacts = [
-            contact
-            for q in postures
-            for contact in guard.contacts(q, parameters.contact_cover, parameters.contact_position, position_sd)
-        ]
-        contacts = [  # what is not known well enough is refused
+        guard, own = self._guard, self.parameters
+        contacts = tuple(
             each
-            for each in contacts
-            if guard.axis(each).force_sd <= parameters.limits.doubt * tolerance(each.force, parameters)
-        ]
-        task, found = self._assess(contacts)
-        if parameters.guard.mode == "limit":
+            for q in postures
+            for each in guard.contacts(q, own.contact_cover, own.contact_position, own.contact_position_sd)
+            # what is not known well enough is refused
+            if guard.axis(each).force_sd <= own.limits.doubt * tolerance(each.force, own)
+        )
+        task = task_of(own)
+        found = guard.assess(task, contacts)
+        if own.guard.mode == "limit":
             if not found.scale and (gain := guard.softer_hold(task, contacts)):
-                self.parameters = replace(self.parameters, posture_gain=gain)
-                task, found = self._assess(contacts)
+                self.parameters = replace(own, posture_gain=gain)
+                found = guard.assess(task_of(self.parameters), contacts)
             if found.reason and found.scale:
-                self.parameters = _accepted(self.parameters, guard.accepted_scale(found))
-                task, found = self._assess(contacts)
-        require(not found.reason or parameters.guard.mode == "warn", found.reason)
-        self.assessment, self.watch = found, Watch(guard, task, found)
+                scale = guard.accepted_scale(found)  # as the reason of the refusal advises
+                gains, rates = (
+                    tuple(scale * each for each in one) for one in (own.force_gain, own.force_proportional_gain)
+                )
+                self.parameters = replace(self.parameters, force_gain=gains, force_proportional_gain=rates)
+                found = guard.assess(task_of(self.parameters), contacts)
+        require(not found.reason or own.guard.mode == "warn", found.reason)
+        self.assessment, self.watch = found, Watch(guard, task_of(self.parameters), found)
 
-    def _assess(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
-        task = task_of(self.parameters)
-        return task, self._guard.assess(task, contacts)
-
-    def _report(self) -> None:
-        self.report = report(self.assessment, self.watch, self.parameters.guard.mode, self.lowered)
+    def _report(self) -> Report:
+        """On the parameters in force."""
+        mode, assessment, watch, lowered = self.parameters.guard.mode, self.assessment, self.watch, self.lowered
+        if assessment is None or watch is None:
+            return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
+        here, factor = min(watch.scale, assessment.scale), self.present
+        message = f"stable, domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
+        if assessment.reason:
+            message = f"not stable: {assessment.reason}"
+        elif factor < 1.0:
+            message += f"; this pose needs smaller gains, so each is multiplied by {factor:.3g}"
+        cycle = assessment.cycle
+        facts = {
+            "guard.mode": mode,
+            "domain": str(assessment.domain),
+            "margin": margin_text(assessment.scale),
+            "margin here": margin_text(here, watch.needed if watch.assessed else GUARD.largest_scale),
+            "pose of margin here": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
+            if watch.assessed
+            else UNKNOWN,
+            "gains multiplied by": f"{factor:.4g}",
+            "lowered": lowered or "nothing",
+            "worst case": assessment.where,
+            "effective stiffness [N/m]": f"{assessment.stiffness:.4g}",
+            "limit cycle [N]": f"{cycle.peak_to_peak:.4g}",
+            "period of the limit cycle [s]": f"{cycle.period:.4g}",
+            "deadband that removes the limit cycle [N]": f"{cycle.deadband:.4g}",
+            "gains": assessment.reason or "accepted",
+        }
+        return Report(message, bool(assessment.reason) or factor < 1.0, facts)
 
     def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
         """Contacts at a position of a cover, m, along both axes across it, with any force."""
@@ -123,12 +155,8 @@ class Supervision:
         where : gives the contacts that are controlled now.
         dt : outer period, s.
         """
-        watch = self.watch
-        if watch is not None:
-            before = watch.assessed
-            watch.step(where, dt)
-            if watch.assessed is not before:
-                self._report()
+        if self.watch is not None and self.watch.step(where, dt):
+            self.report = self._report()
         return self.present
 
     @property
@@ -160,14 +188,12 @@ class Watch:
         self._guard, self._task = guard, task
         self.needed = 1.0 / guard.parameters.stability_fraction
         self.assessed: list[GuardedContact] = []
-        self._pending: list[GuardedContact] = []
-        self._work: Iterator[float] | None = None
-        self._least = math.inf
+        self._work: Iterator[bool] | None = None
         self._since = math.inf
         self.factor, self.scale = 1.0, found.scale
 
     def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
-        """Continue the present assessment, or begin one if it is due; True if the factor has changed.
+        """Continue the present assessment, or begin one if it is due; True if it has ended.
 
         Parameters
         ----------
@@ -180,17 +206,19 @@ class Watch:
             guarded = where()
             contacts = [contact for each in guarded for contact in each.contacts]
             if contacts and self._is_new(contacts):
-                self._pending, self._least = contacts, math.inf
-                self._work = self._guard.scales(self._task, guarded, [part * self.needed for part in GUARD.scales])
-        if self._work is None:
-            return False
-        try:
-            self._least = min(self._least, next(self._work))
-            return False
-        except StopIteration:
-            self._work, self.assessed, self.scale = None, self._pending, self._least
-        before, self.factor = self.factor, min(self.scale / self.needed, 1.0)
-        return self.factor != before
+                self._work = self._assess(guarded, contacts)
+        has_ended = self._work is not None and next(self._work, True)
+        if has_ended:
+            self._work = None
+        return has_ended
+
+    def _assess(self, guarded: Sequence[Guarded], contacts: list[GuardedContact]) -> Iterator[bool]:
+        """One scale in each period; never true."""
+        least = math.inf
+        for scale in self._guard.scales(self._task, guarded, [part * self.needed for part in GUARD.scales]):
+            least = min(least, scale)
+            yield False
+        self.assessed, self.scale, self.factor = contacts, least, min(least / self.needed, 1.0)
 
     def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
         return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
@@ -202,61 +230,6 @@ def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:
     shifted = max(abs(one.position - other.position), abs(one.position_sd - other.position_sd)) > GUARD.shift
     grown = not one.force / GUARD.growth <= other.force <= one.force * GUARD.growth
     return turned or bent or shifted or grown or one.cover != other.cover
-
-
-class Report(NamedTuple):
-    """One line, whether it is a warning, and the numbers behind it by name."""
-
-    message: str
-    is_warning: bool
-    facts: dict[str, str]
-
-
-def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, lowered: str) -> Report:
-    """Report on the parameters in force.
-
-    Parameters
-    ----------
-    assessment : of these parameters; None where the guard is off or nothing is fed back.
-    watch : what the guard does while the arm moves.
-    mode : of the guard.
-    lowered : what the guard has lowered, '' where nothing.
-    """
-    if assessment is None or watch is None:
-        return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
-    here, is_scaled = min(watch.scale, assessment.scale), watch.factor < 1.0 and mode != "warn"
-    message = f"stable, domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
-    if assessment.reason:
-        message = f"not stable: {assessment.reason}"
-    elif is_scaled:
-        message += f"; this pose needs smaller gains, so each is multiplied by {watch.factor:.3g}"
-    cycle = assessment.cycle
-    facts = {
-        "guard.mode": mode,
-        "domain": str(assessment.domain),
-        "margin": margin_text(assessment.scale),
-        "margin here": margin_text(here, watch.needed if watch.assessed else GUARD.largest_scale),
-        "pose of margin here": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
-        if watch.assessed
-        else UNKNOWN,
-        "gains multiplied by": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
-        "lowered": lowered or "nothing",
-        "worst case": assessment.where,
-        "effective stiffness [N/m]": f"{assessment.stiffness:.4g}",
-        "limit cycle [N]": f"{cycle.peak_to_peak:.4g}",
-        "period of the limit cycle [s]": f"{cycle.period:.4g}",
-        "deadband that removes the limit cycle [N]": f"{cycle.deadband:.4g}",
-        "gains": assessment.reason or "accepted",
-    }
-    return Report(message, bool(assessment.reason) or is_scaled, facts)
-
-
-def _accepted(own: ForceLoopParameters, scale: float) -> ForceLoopParameters:
-    """The set that the reason of a refusal advises: gains lower by a scale."""
-    gain, proportional = (
-        tuple(scale * each for each in gains) for gains in (own.force_gain, own.force_proportional_gain)
-    )
-    return replace(own, force_gain=gain, force_proportional_gain=proportional)
 
 
 def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:

@@ -8,7 +8,7 @@ the loop for small errors (domain II); the guard does not rely on that.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -158,6 +158,7 @@ class GuardAssessment(NamedTuple):
     reason: str
 
 
+@dataclass(frozen=True)
 class StabilityGuard:
     """Assesses parameters of the force loop on one arm; guards with the same parameters are equal.
 
@@ -175,21 +176,22 @@ class StabilityGuard:
         where lists do not fit the arm.
     """
 
-    def __init__(
-        self, arm: Arm, servo: Servo, timing: Timing, parameters: GuardParameters, sensing: SensingParameters
-    ) -> None:
-        lengths("guard", arm.joints.names, {"posture": parameters.posture})
-        self.parameters = parameters
-        self._arm, self._timing = arm, timing
-        self._loop = SampledLoop(arm, timing, servo)
-        self._force_axes = ForceAxes(self._loop.body, sensing)
-        self._whole = arm, servo, timing, parameters, sensing
+    arm: Arm
+    servo: Servo
+    timing: Timing
+    parameters: GuardParameters
+    sensing: SensingParameters
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, StabilityGuard) and self._whole == other._whole
+    def __post_init__(self) -> None:
+        lengths("guard", self.arm.joints.names, {"posture": self.parameters.posture})
 
-    def __hash__(self) -> int:
-        return hash(self._whole)
+    @cached_property
+    def _loop(self) -> SampledLoop:
+        return SampledLoop(self.arm, self.timing, self.servo)
+
+    @cached_property
+    def _force_axes(self) -> ForceAxes:
+        return ForceAxes(self._loop.body, self.sensing)
 
     def contacts(
         self,
@@ -239,18 +241,15 @@ class StabilityGuard:
                 for part, stiffness in product(self._parts(task), together):
                     yield self._loop.margin(each.q, axes, part * stiffness, feedback, tried)
 
-    def assess(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> GuardAssessment:
-        """Assess a task at its worst contact; what a process has assessed lately is not computed again.
+    @lru_cache(maxsize=64)  # noqa: B019 - what a process has assessed lately is not computed again
+    def assess(self, task: GuardedTask, contacts: tuple[GuardedContact, ...]) -> GuardAssessment:
+        """Assess a task at its worst contact.
 
         Parameters
         ----------
         task : what is controlled.
         contacts : contacts to consider; none counts as a task that controls nothing.
         """
-        return _assessed(self, task, tuple(contacts))
-
-    def compute(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> GuardAssessment:
-        """The assessment itself; parameters as for `assess`."""
         law = task.law
         if not contacts or not any((*law.gain, *law.proportional_gain)):
             return GuardAssessment(
@@ -289,7 +288,7 @@ class StabilityGuard:
 
         With the friction of the joints alone: the velocity loop encloses that of the rotors.
         """
-        joints, loop = self._arm.joints, self._loop
+        joints, loop = self.arm.joints, self._loop
         reach = self.axis(contact).lever
         square = float(reach @ reach)
         inertia = loop.body.mass_matrix(contact.q) + loop.armature
@@ -322,11 +321,10 @@ class StabilityGuard:
 
     def _hopeless(self, task: GuardedTask, contacts: Sequence[GuardedContact], found: GuardAssessment) -> str:
         """Why every force gain is refused, and what of that would help which was tried."""
-        arm, servo, timing, own, sensing = self._whole
+        own, gain = self.parameters, self.softer_hold(task, contacts)
         half = replace(own, contact_stiffness=0.5 * own.contact_stiffness)
-        gain = self.softer_hold(task, contacts)
         ways = [f"lower posture_gain to {rounded_down(gain):g}"] * bool(gain)
-        if StabilityGuard(arm, servo, timing, half, sensing)._controls(task, contacts):
+        if replace(self, parameters=half)._controls(task, contacts):
             ways.append(f"declare softer surfaces (guard.contact_stiffness={half.contact_stiffness:g})")
         return (
             f"force_gain {listed(task.law.gain)} is not stable, nor is any smaller one ({found.where}, contact up to "
@@ -336,7 +334,7 @@ class StabilityGuard:
     def _delays(self, task: GuardedTask) -> list[int]:
         """Inner periods by which a command may be later; the mean over a cycle of a dither is half a cycle old."""
         extra = self.parameters.extra_delay
-        mean = self._timing.dither_cycle // 2 if task.feedback.kind == ESTIMATE else 0
+        mean = self.timing.dither_cycle // 2 if task.feedback.kind == ESTIMATE else 0
         return sorted({0, extra, extra + mean})
 
     def _parts(self, task: GuardedTask) -> tuple[float, ...]:
@@ -344,8 +342,8 @@ class StabilityGuard:
         return DESIGN.softer[:1] if task.feedback.kind == "joint_position" else DESIGN.softer
 
     def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
-        timing = self._timing
-        n = len(self._arm.joints.names)
+        timing = self.timing
+        n = len(self.arm.joints.names)
         delay = task.delay_samples * timing.outer_divisor + timing.outer_delay + late
         if isinstance(contact, GuardedForces):
             return Axes(*contact[1:], task.filter_time, delay)
@@ -358,11 +356,6 @@ class StabilityGuard:
     def _stiffness(self, contact: GuardedContact) -> Array:
         lever = self.axis(contact).lever
         return self.parameters.contact_stiffness * np.outer(lever, lever)
-
-
-@lru_cache(maxsize=64)
-def _assessed(guard: StabilityGuard, task: GuardedTask, contacts: tuple[GuardedContact, ...]) -> GuardAssessment:
-    return guard.compute(task, contacts)
 
 
 def _lags(feedback: Feedback) -> list[Feedback]:

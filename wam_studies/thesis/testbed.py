@@ -106,7 +106,7 @@ def margin_with_servo(run: Recording) -> float:
     found = StabilityGuard(run.shared.arm, servo, run.shared.timing, guard, parameters.sensing)
     touches = found.contacts(guard.posture, parameters.contact_cover, parameters.contact_position, 0.0)
     law = force_law(parameters)
-    return law.gain[ACROSS] * found.assess(task_of(parameters), touches).scale
+    return law.gain[ACROSS] * found.assess(task_of(parameters), tuple(touches)).scale
 
 
 def margin(runs: Runs, how: str, with_servo: float = math.nan) -> list[Comparison]:
