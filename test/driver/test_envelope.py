@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from wam_control.force.force_command import CommandAdmission
+from wam_control.force.force_input import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.configuration import Configuration, packaged
 from wam_description.event_text import LESS, sentence
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE, ForceCommand, Wrench
+from wam_description.signals import BASE, ForceCommand, State, Wrench
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.limit_watch import LimitWatch, WatchedLimit, excess
@@ -260,7 +261,8 @@ def admitted(
     posture: Sequence[float] | None = None,
     torque: Sequence[float] | None = None,
 ) -> CommandAdmission:
-    admission.step(own, ARM.joints.start, force, posture, torque, DT)
+    given = State(ARM.joints.start, [], [])
+    admission.step(own, ForceInput(given, DT, command=force, posture=posture, torque=torque))
     return admission
 
 

@@ -8,6 +8,7 @@
 ``contact_place``          where a force acts: pinned or estimated
 ``force_axis``             how a force along a direction is sensed, how the arm moves along it, how well
 ``force_command``          which commands are admitted: limits and age
+``force_input``            what the loop is given in one outer period
 ``force_law``              error to velocity of one axis: saturation, deadband, G_I, G_P
 ``force_loop``             one outer period
 ``force_loop_node``        the node

@@ -72,12 +72,13 @@ class AxisRun:
         self._shown += (self.rising - self._shown) * dt / (FORCE.shown * own.latency + dt)
         return self._shown
 
-    def goal(self, axis: CommandedAxis, dt: float, lasting: float) -> float:
+    def goal(self, dt: float, lasting: float) -> float:
         """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""
+        axis = self.now
         if math.isnan(self.anchor):
             self.anchor = axis.at
         if axis.of.kind is AxisKind.VELOCITY:  # what is behind for long is forgotten
-            self.anchor += (axis.of.value or 0.0) * dt + (axis.at - self.anchor) * dt / lasting
+            self.anchor += axis.of.speed * dt + (axis.at - self.anchor) * dt / lasting
         elif axis.of.value is not None:
             return axis.of.value
         return self.anchor

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from wam_control.force.contact_place import pinned_position, torque_of_position
+from wam_control.force.force_input import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.force.thresholds import FORCE
@@ -45,22 +46,14 @@ class CommandAdmission:
         self._is_moved = self._has_lapsed = self._is_ignored = False
         self.posture = list(q)
 
-    def step(
-        self,
-        own: ForceLoopParameters,
-        q: Sequence[float],
-        force: ForceCommand | None,
-        posture: Sequence[float] | None,
-        torque: Sequence[float] | None,
-        dt: float,
-        task: TaskCommand | None = None,
-    ) -> None:
-        """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
+    def step(self, own: ForceLoopParameters, given: ForceInput) -> None:
+        """Admit the commands of one outer period."""
         before, self.refusals = self.force, {}
+        force, posture, q = given.command, given.posture, given.joints.position
         if force is not None and 0.0 < _size(force) < FORCE.smallest_force:
             force = force._replace(force=ZERO)
         reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
-        self._age = self._age + dt if reason else 0.0
+        self._age = self._age + given.dt if reason else 0.0
         if not reason:
             self.force = force
         else:
@@ -72,7 +65,7 @@ class CommandAdmission:
         if posture is not None and (beyond := self._joints.beyond(posture)):
             self._refuse("joint_posture_command", f"{beyond}; the last good posture remains in use")
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
-        self._refuse_without_effect(own.mode, q, force, posture, torque, task)
+        self._refuse_without_effect(own.mode, given._replace(command=force, posture=posture))
         posture = None if self._is_ignored else posture
         has_ended = force is None and bool(_size(before))  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
@@ -85,23 +78,16 @@ class CommandAdmission:
     def _refuse(self, topic: str, reason: str) -> None:
         self.refusals[topic] = refused(topic, reason)
 
-    def _refuse_without_effect(
-        self,
-        mode: str,
-        q: Sequence[float],
-        force: ForceCommand | None,
-        posture: Sequence[float] | None,
-        torque: Sequence[float] | None,
-        task: TaskCommand | None,
-    ) -> None:
+    def _refuse_without_effect(self, mode: str, given: ForceInput) -> None:
         """Refuse what has no effect in this mode, or with this task: a force, a posture that moves, a torque."""
-        joints = len(self._joints.names)
+        joints, task, posture = len(self._joints.names), given.task, given.posture
         is_of_posture = mode == "hybrid" if task is None else len(task.axes) < joints
-        self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture, q))
+        moves = posture is not None and (self._is_ignored or self._moves(posture, given.joints.position))
+        self._is_ignored = moves and not is_of_posture
         useless = (
-            ("force_command", task is not None and bool(_size(force))),
+            ("force_command", task is not None and bool(_size(given.command))),
             ("joint_posture_command", self._is_ignored),
-            ("joint_torque_command", torque is not None),
+            ("joint_torque_command", given.torque is not None),
         )
         for topic, is_useless in useless:
             if is_useless and topic not in self.refusals:

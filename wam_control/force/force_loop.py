@@ -21,6 +21,7 @@ from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, beyond
+from wam_control.force.force_input import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import Seen
@@ -37,52 +38,19 @@ from wam_control.force.limits import (
     servo_yielding,
 )
 from wam_control.force.problem import VelocityRow, solve, unlimited
-from wam_control.force.stability_guard import GuardAssessment
+from wam_control.force.stability_guard import GuardAssessment, triple
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, warning
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.signals import BASE, NO_CONTACT, ZERO, Contact, ForceCommand, State, Triple
+from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, Triple
 from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceInput", "ForceLoop", "ForceLoopParameters", "ForceOutput", "by_seriousness"]
 
 AxisRow = tuple[float, float, float, float, float]  # under TASK_AXIS_COLUMNS
-
-
-class ForceInput(NamedTuple):
-    """What the force loop is given in one outer period; None is what nobody gives.
-
-    Attributes
-    ----------
-    joints : joint state from the motors.  Where no motor gives any torque they are braked or in fault: all controller
-        state is reset then.
-    dt : outer period, s.
-    sensors : joint-side sensors.
-    contact : estimated contact, force of the world on the cover.  Without the signals that `feedback` names neither
-        force nor joint torque is controlled.
-    external, external_sd : estimated torques of the world on the joints (n,), N m, and their standard deviations.
-    command : commanded force; None or zero leaves all axes to the posture.  Where a force ends with None, the arm
-        stays where it is.
-    posture : commanded joint angles (n,), rad; None holds those of the start, or those where a posture ended.
-    rate : velocity at which the commanded posture moves (n,), rad/s.
-    torque : commanded joint torques on the world (n,), N m: a task with an axis for each joint.
-    task : takes the place of force and torque; where it ends, the arm stays where it is.
-    """
-
-    joints: State
-    dt: float
-    sensors: State | None = None
-    contact: Contact | None = None
-    external: Sequence[float] | None = None
-    external_sd: Sequence[float] | None = None
-    command: ForceCommand | None = None
-    posture: Sequence[float] | None = None
-    rate: Sequence[float] | None = None
-    torque: Sequence[float] | None = None
-    task: TaskCommand | None = None
 
 
 class ForceOutput(NamedTuple):
@@ -217,7 +185,7 @@ class ForceLoop:
         given = self._measurable(given)
         contact = given.contact or NO_CONTACT
         is_touched = bool(contact.cover) or self._run.is_touching
-        self._measurement.step(own, joints, given.sensors, given.external, given.external_sd, is_touched, dt)
+        self._measurement.step(own, given, is_touched)
         topic = "force_command" if given.task is None else "task_command"
         if given.task is None and given.torque is not None and own.mode != "open_loop":
             topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
@@ -225,7 +193,7 @@ class ForceLoop:
         if given.task is None and self._run.key[:1] == (TaskCommand,):
             self._admission.restart(self._q)  # the arm stays where it is
         admitted = self._admission
-        admitted.step(own, self._q, given.command, given.posture, given.torque, dt, given.task)
+        admitted.step(own, given)
         self.refusals = admitted.refusals
         task, key = _task(admitted.force, given.task, own)
         if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
@@ -354,11 +322,10 @@ class ForceLoop:
         own, run, sensing, supervision = self.parameters, self._run, self._axes.forces, self._supervision
         axes = [one.now for one in run.axes]
         holds = any(event.holds for event in found)
-        factor = (
-            supervision.factor(lambda: guarded(self._q, axes, contact, sensing, own, supervision), dt) if axes else 1.0
-        )
-        may_watch = axes and own.is_estimated and not run.is_touching
-        is_watching = bool(may_watch) and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
+        if axes:
+            supervision.step(lambda: guarded(self._q, axes, contact, sensing, own, supervision), dt)
+        may_watch = bool(axes) and own.is_estimated and not run.is_touching
+        is_watching = may_watch and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
         torque_sd = self._measurement.torques.sd
         if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
             run.still_sd = torque_sd
@@ -368,13 +335,11 @@ class ForceLoop:
         if holds:
             run.held_at = self._hold_at(found, contact) if run.held_at is None else run.held_at
             # what it may hit on its way back after a push
-            wanted = self._towards(run.held_at.tolist())
-            wanted = calm(wanted, sensing.moved_inertia(self._pose), own.impact_energy(allowed))
+            wanted = calm(self._towards(run.held_at), sensing.moved_inertia(self._pose), own.impact_energy(allowed))
         else:
             run.held_at = None
-            rows = self._rows(factor, is_watching, dt) if axes else []
-            goal = [angle + way for angle, way in zip(posture, run.approached.tolist(), strict=True)]
-            wanted = self._towards(goal, rate)
+            rows = self._rows(is_watching, dt) if axes else []
+            wanted = self._towards(np.array(posture) + run.approached, rate)
             if rate is None:
                 wanted = self._slowed(rows, wanted)
         least = self._pushes(forces, contact, holds, allowed, dt)
@@ -389,15 +354,14 @@ class ForceLoop:
         fed = run.fed_forward(holds, own)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
             countered = _dry_friction(self._body.arm, self._map, velocity.tolist())
-            friction = run.friction.step(countered, FORCE.friction_time, dt)
-            fed += own.friction_feedforward * np.array(friction)
+            fed += own.friction_feedforward * run.friction.step(np.array(countered), FORCE.friction_time, dt)
         return velocity, fed.tolist(), limits
 
-    def _towards(self, goal: Sequence[float], rate: Sequence[float] | None = None) -> Array:
+    def _towards(self, goal: Array, rate: Sequence[float] | None = None) -> Array:
         """Velocities (n,), rad/s, towards joint angles (n,), rad, that move at a rate (n,), rad/s."""
-        gain, most = self.parameters.posture_gain, self.parameters.joint_speed_limit
-        each = zip(goal, self._q, rate or [0.0] * len(goal), strict=True)
-        return np.array([min(max(gain * (angle - at) + speed, -most), most) for angle, at, speed in each])
+        own, most = self.parameters, self.parameters.joint_speed_limit
+        wanted = own.posture_gain * (goal - self._pose) + np.array(rate or 0.0)
+        return np.minimum(np.maximum(wanted, -most), most)
 
     def _hold_at(self, found: Sequence[Event], contact: Contact) -> Array:
         """Where the arm is to hold (n,), rad: here, or off another link, on from where it last was free."""
@@ -409,10 +373,10 @@ class ForceLoop:
         away = torques * (math.hypot(*contact.force) / float(torques @ torques))
         return run.free_at + FORCE.way_back * away  # friction would hold it in less
 
-    def _rows(self, factor: float, is_watching: bool, dt: float) -> list[VelocityRow]:
+    def _rows(self, is_watching: bool, dt: float) -> list[VelocityRow]:
         """The commanded velocity along each axis; none while the arm is watched before it moves."""
         run, own = self._run, self.parameters
-        speeds = [self._speed(one, factor, dt) for one in run.axes]
+        speeds = [self._speed(one, dt) for one in run.axes]
         watch = self._supervision.watch
         is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_force for one in run.axes)
         if is_watching or not is_assessed:
@@ -421,18 +385,18 @@ class ForceLoop:
         late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)
         return [VelocityRow(one.now.along, speed) for one, speed in zip(run.axes, late, strict=True)]
 
-    def _speed(self, one: AxisRun, factor: float, dt: float) -> float:
+    def _speed(self, one: AxisRun, dt: float) -> float:
         """Commanded speed along one axis, m/s or rad/s."""
         own, axis, known = self.parameters, one.now, one.known
         fastest = own.task.fastest(axis.is_joint)[0]
         if axis.is_force:
-            speed = self._force_speed(one, factor, dt)
+            speed = self._force_speed(one, dt)
             return min(max(speed, -fastest), fastest) if len(self._run.axes) > 1 else speed
-        goal = one.goal(axis, dt, own.limits.settling_time)
+        goal = one.goal(dt, own.limits.settling_time)
         if axis.of.kind is AxisKind.VELOCITY:
-            speed = axis.of.value or 0.0
+            speed = axis.of.speed
         elif axis.of.kind is AxisKind.POSITION:
-            speed = axis.of.rate + own.task.largest_rate * (goal - axis.at)
+            speed = axis.of.speed + own.task.largest_rate * (goal - axis.at)
         else:
             band = own.task.joint_deadband if axis.is_joint else own.task.deadband
             if not axis.is_joint and known.force < -band:
@@ -442,9 +406,9 @@ class ForceLoop:
             speed = axis.side * axis.of.rate + yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
-    def _force_speed(self, one: AxisRun, factor: float, dt: float) -> float:
+    def _force_speed(self, one: AxisRun, dt: float) -> float:
         """The law of a force or a torque, as fast as the limits allow."""
-        own, axis, known = self.parameters, one.now, one.known
+        own, axis, known, factor = self.parameters, one.now, one.known, self._supervision.factor
         if axis.sensed is None:
             error, before = axis.desired - known.force, axis.desired - known.before
             return factor * self._supervision.torque_law.velocity(axis.of.joint, error, before, dt)
@@ -493,7 +457,7 @@ class ForceLoop:
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._pose).dot(torques.acceleration)
         chi2 = max([one.known.chi2 for one in run.axes], default=0.0)
-        gain = self._supervision.present * max(own.force_gain)
+        gain = self._supervision.factor * max(own.force_gain)
         return self._pushed.step(
             self._pose, forces, now, torques.sd, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt
         )
@@ -522,20 +486,18 @@ class ForceLoop:
         if any(event.holds or event.code is Code.PUSHED for event in found):
             run.motions.clear()
             return []
-        lasting = FORCE.quarter * own.limits.settling_time
-        events = []
-        for i, one in enumerate(run.axes):
-            axis = one.now
-            if axis.of.kind in (AxisKind.POSITION, AxisKind.VELOCITY):
-                speed = axis.of.rate if axis.of.kind is AxisKind.POSITION else axis.of.value or 0.0
-                law = (own.task.largest_rate, own.task.fastest(axis.is_joint)[0])
-                goal = one.goal(axis, 0.0, math.inf)
-                events.append(run.motions[i].step(axis.of.name, axis.of.unit, goal, speed, axis.at, *law, lasting, dt))
+        moving: list[tuple[str, str, float, float, float, float, float]] = []
+        for one in run.axes:
+            if one.of.kind in (AxisKind.POSITION, AxisKind.VELOCITY):
+                axis, of, goal = one.now, one.now.of, one.goal(0.0, math.inf)
+                law = own.task.largest_rate, own.task.fastest(axis.is_joint)[0]
+                moving.append((of.name, of.unit, goal, of.speed, axis.at, *law))
         if not run.axes and posture is not None:
             law, rates = (own.posture_gain, own.joint_speed_limit), rate or [0.0] * len(self._q)
             each = zip(self._body.arm.joints.names, posture, rates, self._q, strict=True)
-            for i, (name, goal, speed, at) in enumerate(each):
-                events.append(run.motions[i].step(name, "rad", goal, speed, at, *law, lasting, dt))
+            moving = [(name, "rad", goal, speed, at, *law) for name, goal, speed, at in each]
+        lasting = FORCE.quarter * own.limits.settling_time
+        events = [run.motions[i].step(*one, lasting, dt) for i, one in enumerate(moving)]
         return [event for event in events if event]
 
     def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
@@ -560,16 +522,13 @@ class ForceLoop:
         return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
 
     def _output(self, velocity: Array, effort: list[float], frame: str, is_task: bool) -> ForceOutput:
-        measured = error = limited = ZERO
-        each = self._run.axes
+        each, sums = self._run.axes, np.zeros((3, 3))
         for one in each:
             axis, known = one.now, one.known
             if axis.is_force and axis.sensed is not None:
-                law = self._supervision.force_law.along(axis.in_frame.tolist())
-                off = axis.desired - known.force
-                measured = _added(measured, known.force, axis.in_frame)
-                error = _added(error, off, axis.in_frame)
-                limited = _added(limited, law.limited(0, off), axis.in_frame)
+                law, off = self._supervision.force_law.along(axis.in_frame.tolist()), axis.desired - known.force
+                sums += np.outer([known.force, off, law.limited(0, off)], axis.in_frame)
+        measured, error, limited = map(triple, sums)
         return ForceOutput(
             velocity.tolist(),
             effort,
@@ -605,11 +564,6 @@ def by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
     """One event of each subject, those that stop the arm first, then in the order of the codes."""
     each = {event.subject: event for event in found}
     return tuple(sorted(each.values(), key=lambda event: (not event.holds, event.code.number)))
-
-
-def _added(sum_before: Triple, size: float, direction: Array) -> Triple:
-    (a, b, c), (x, y, z) = sum_before, direction.tolist()
-    return a + size * x, b + size * y, c + size * z
 
 
 def _row(one: AxisRun) -> AxisRow:

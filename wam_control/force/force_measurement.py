@@ -8,11 +8,11 @@ import numpy as np
 
 from wam_control.force.belief import WorldTorques
 from wam_control.force.force_axis import Angles
+from wam_control.force.force_input import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.signals import State
 
 
 class LowPass:
@@ -24,13 +24,12 @@ class LowPass:
     """
 
     def __init__(self) -> None:
-        self.value = list[float]()
+        self.value = np.zeros(0)
 
-    def step(self, value: Sequence[float], time_constant: float, dt: float) -> list[float]:
+    def step(self, value: Array, time_constant: float, dt: float) -> Array:
         """Filtered values; `time_constant` and `dt` in s."""
-        share = dt / (dt + time_constant)
-        each = zip(self.value or value, value, strict=True)
-        self.value = [before + (now - before) * share for before, now in each]
+        before = self.value if self.value.size else value
+        self.value = before + (value - before) * (dt / (dt + time_constant))
         return self.value
 
 
@@ -69,7 +68,7 @@ class ForceMeasurement:
         self.free = self._external = self._none
         self._q: Sequence[float] = ()
         self._torque_sd = self._none
-        self._velocity = list[float]()
+        self._velocity = np.zeros(0)
         self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
         self.rested, self.speed = 0.0, math.inf
         self.restart()
@@ -79,50 +78,38 @@ class ForceMeasurement:
         self._filter = LowPass()
         self.torques = WorldTorques(self._none, self._none, None, self._none)
 
-    def step(
-        self,
-        own: ForceLoopParameters,
-        joints: State,
-        sensors: State | None,
-        estimated: Sequence[float] | None,
-        estimated_sd: Sequence[float] | None,
-        is_touched: bool,
-        dt: float,
-    ) -> None:
+    def step(self, own: ForceLoopParameters, given: ForceInput, is_touched: bool) -> None:
         """Take the signals of one outer period.
 
         Parameters
         ----------
         own : `feedback` chooses the signal.  joint_sensors: at rest, the torque that carries the links less the strain.
             joint_position: deflection of a known spring, section 5.6.
-        joints : joint state from the motors.
-        sensors : joint-side sensors, None where there are none.
-        estimated, estimated_sd : estimated torques of the world on the joints (n,), N m, and their standard deviation.
+        given : signals, and the outer period.
         is_touched : whether a contact is known; without one, estimated torques count as zero.
-        dt : outer period, s.
         """
-        torque = self._torque(own, sensors, estimated)
-        self._q, self._torque_sd = joints.position, self._none + own.sensing_fed_back.torque_sd
-        self.speed = max(map(abs, self._speed.step(joints.velocity, FORCE.steady_time, dt)))
+        dt, torque = given.dt, self._torque(own, given)
+        self._q, self._torque_sd = given.joints.position, self._none + own.sensing_fed_back.torque_sd
+        speeds = self._speed.step(np.array(given.joints.velocity), FORCE.steady_time, dt)
+        self.speed = float(np.abs(speeds).max())
         self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
-        self._steady.step(torque.tolist(), FORCE.steady_time, dt)
+        self._steady.step(torque, FORCE.steady_time, dt)
         self._external = torque - self._zeros
+        is_first = not self._filter.value.size
         counted = self._external if is_touched or not own.is_estimated else self._none
-        is_first = not self._filter.value
-        now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
-        sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._torque_sd
-        self.torques = WorldTorques(now, now if is_first else self.torques.now, self._accelerated(own, sensors, dt), sd)
-
-    def _accelerated(self, own: ForceLoopParameters, sensors: State | None, dt: float) -> Array | None:
-        velocity = [0.0] * len(self._none) if sensors is None else sensors.velocity
-        change = [(now - before) / dt for now, before in zip(velocity, self._velocity or velocity, strict=True)]
+        now = self._filter.step(counted, own.force_filter, dt)
+        velocity = self._none if given.sensors is None else np.array(given.sensors.velocity)
+        before = self._velocity if self._velocity.size else velocity
+        filtered = self._acceleration.step((velocity - before) / dt, own.force_filter, dt)
         self._velocity = velocity
-        filtered = self._acceleration.step(change, own.force_filter, dt)
-        return np.array(filtered) if own.feedback == "joint_sensors" else None
+        acceleration = filtered if own.feedback == "joint_sensors" else None
+        sd = np.array(given.external_sd) if own.is_estimated and given.external_sd else self._torque_sd
+        self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
 
-    def _torque(self, own: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None) -> Array:
+    def _torque(self, own: ForceLoopParameters, given: ForceInput) -> Array:
+        sensors = given.sensors
         if own.is_estimated:
-            return self._none if estimated is None else np.array(estimated)
+            return self._none if given.external is None else np.array(given.external)
         if sensors is None:
             return self._none
         if own.feedback == "joint_position":
@@ -151,11 +138,11 @@ class ForceMeasurement:
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
-        return np.array(self._steady.value) - self._zeros
+        return self._steady.value - self._zeros
 
     def zero(self, limit: float) -> None:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m."""
-        found = np.array(self._steady.value) - self._tare.at(self._body, self._q)
+        found = self._steady.value - self._tare.at(self._body, self._q)
         if float(np.abs(found).max()) <= limit:
             self._zero = self._taken(found)
             self.free = self._zeros

@@ -22,7 +22,7 @@ from wam_control.force.stability_guard import (
     listed,
     posture_of,
 )
-from wam_control.force.thresholds import FORCE, GUARD
+from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 from wam_description.transmission_map import TransmissionMap
@@ -54,6 +54,7 @@ class Supervision:
 
     Attributes
     ----------
+    guard : with the parameters of the set.
     servo_stiffness : integral gains of the velocity loop at the joints (n, n), N m/rad.
     parameters : those in force.
     force_law, torque_law : laws in force.
@@ -75,7 +76,7 @@ class Supervision:
         self.servo_stiffness = TransmissionMap.of(arm).at_joints(servo.integral_gain)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
-        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, parameters.sensing_fed_back)
+        self.guard = StabilityGuard(arm, servo, timing, parameters.guard, parameters.sensing_fed_back)
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
         self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, arm.joints.names)
@@ -83,7 +84,7 @@ class Supervision:
         self.report = self._report()
 
     def _judge(self, postures: Sequence[tuple[float, ...]]) -> None:
-        guard, own = self._guard, self.parameters
+        guard, own = self.guard, self.parameters
         contacts = tuple(
             each
             for q in postures
@@ -112,7 +113,7 @@ class Supervision:
         mode, assessment, watch, lowered = self.parameters.guard.mode, self.assessment, self.watch, self.lowered
         if assessment is None or watch is None:
             return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
-        here, factor = min(watch.scale, assessment.scale), self.present
+        here, factor = min(watch.scale, assessment.scale), self.factor
         message = f"stable, domain {assessment.domain}{lowered and '; lowered to be stable: '}{lowered}"
         if assessment.reason:
             message = f"not stable: {assessment.reason}"
@@ -138,29 +139,13 @@ class Supervision:
         }
         return Report(message, bool(assessment.reason) or factor < 1.0, facts)
 
-    def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
-        """Contacts at a position of a cover, m, along both axes across it, with any force."""
-        return self._guard.contacts(q, cover, position, position_sd, [FORCE.sized_force])
-
-    def gains(self, joint: int, direction: Sequence[float]) -> tuple[float, float]:
-        """G_I and G_P of a joint, or for -1 of the force along a unit vector of its frame (3,)."""
-        law = self.torque_law if joint >= 0 else self.force_law.along(direction)
-        return law.gain[max(joint, 0)], law.proportional_gain[max(joint, 0)]
-
-    def factor(self, where: Callable[[], Sequence[Guarded]], dt: float) -> float:
-        """Factor of the gains in this period.
-
-        Parameters
-        ----------
-        where : gives the contacts that are controlled now.
-        dt : outer period, s.
-        """
+    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> None:
+        """Go on with the assessment; arguments as those of `Watch.step`."""
         if self.watch is not None and self.watch.step(where, dt):
             self.report = self._report()
-        return self.present
 
     @property
-    def present(self) -> float:
+    def factor(self) -> float:
         """Factor of the gains in force."""
         return 1.0 if self.watch is None or self.parameters.guard.mode == "warn" else self.watch.factor
 

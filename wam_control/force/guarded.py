@@ -10,7 +10,7 @@ from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.guard import Supervision
 from wam_control.force.problem import linear
-from wam_control.force.stability_guard import Guarded, GuardedContact, GuardedForces
+from wam_control.force.stability_guard import Guarded, GuardedContact, GuardedForces, triple
 from wam_control.force.task import AxisKind, TaskAxis
 from wam_control.force.thresholds import FORCE
 from wam_description.signals import Contact
@@ -40,13 +40,15 @@ def guarded(
     contacts = []
     for axis in axes:
         if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < np.inf:
-            x, y, z = axis.direction.tolist()
-            contacts.append(GuardedContact(tuple(q), *axis.place[:3], (x, y, z), axis.desired or FORCE.hand))
+            direction = triple(axis.direction)
+            contacts.append(GuardedContact(tuple(q), *axis.place[:3], direction, axis.desired or FORCE.hand))
     if contacts:
         together = [tuple(contacts)]
     elif any(axis.is_joint and axis.is_force for axis in axes):
         places = ContactPlace(forces.covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
-        together = [(one,) for place in places for one in supervision.contacts(q, *place[:3])]
+        together = [
+            (one,) for place in places for one in supervision.guard.contacts(q, *place[:3], [FORCE.sized_force])
+        ]
     else:
         return []
     n = len(q)
@@ -57,7 +59,9 @@ def guarded(
             sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
         if axis.is_force:
             move[:, i] *= 1.0 if axis.sensed is None else axis.sensed.speed_fraction
-            gain[:, i] = supervision.gains(axis.of.joint, axis.in_frame.tolist())
+            law = supervision.torque_law if axis.is_joint else supervision.force_law.along(axis.in_frame.tolist())
+            at = max(axis.of.joint, 0)
+            gain[:, i] = law.gain[at], law.proportional_gain[at]
         elif axis.of.kind is not AxisKind.VELOCITY:
             rate = own.task.largest_rate
             if axis.of.kind is AxisKind.IMPEDANCE:

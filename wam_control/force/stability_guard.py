@@ -21,6 +21,7 @@ from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
 from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter
+from wam_description.signals import Triple
 from wam_theory.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_theory.linear_loop import series_stiffness
 from wam_theory.rounding import rounded_down
@@ -103,7 +104,7 @@ class GuardedContact(NamedTuple):
     cover: str
     position: float
     position_sd: float
-    direction: tuple[float, float, float]
+    direction: Triple
     force: float
 
     @property
@@ -204,7 +205,7 @@ class StabilityGuard:
         """Contacts at a position of a cover, m: along both axes across it, with each of some forces, N."""
         rotation = self._loop.body.cover_pose(q, cover).rotation
         candidates = [
-            GuardedContact(tuple(q), cover, position, position_sd, _triple(rotation[:, axis]), force)
+            GuardedContact(tuple(q), cover, position, position_sd, triple(rotation[:, axis]), force)
             for axis in (1, 2)
             for force in forces
         ]
@@ -373,6 +374,7 @@ def listed(values: Sequence[float]) -> str:
     return "[" + ", ".join(f"{0.0 if abs(value) < 1e-9 else value:.3g}" for value in values) + "]"
 
 
-def _triple(values: Array) -> tuple[float, float, float]:
+def triple(values: Array) -> Triple:
+    """A vector (3,) as a tuple."""
     x, y, z = values.tolist()
     return x, y, z

@@ -57,6 +57,11 @@ class TaskAxis(NamedTuple):
         return self.kind in (AxisKind.FORCE, AxisKind.IMPEDANCE)
 
     @property
+    def speed(self) -> float:
+        """At which its goal moves, m/s or rad/s."""
+        return (self.value or 0.0) if self.kind is AxisKind.VELOCITY else self.rate
+
+    @property
     def unit(self) -> str:
         """Of a position along it."""
         return "rad" if self.joint >= 0 else "m"
