@@ -10,7 +10,7 @@ import pytest
 from arms import BODY, CONFIGURATION, WAM
 from numpy.typing import NDArray
 
-from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
+from wam_control.force.force_axis import ForceAxes, ForceAxis, ForcePlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ def lateral(q: Sequence[float]) -> Array:
 
 
 def axis_of(q: Sequence[float], direction: Array, force: float = 10.0, at: float = 0.28, sd: float = 0.0) -> ForceAxis:
-    return ForceAxes(BODY, SENSING).axis(q, PressedForce(OUTER, at, sd, direction, force))
+    return ForceAxes(BODY, SENSING).axis(q, ForcePlace(OUTER, at, sd), direction, force)
 
 
 def test_at_every_pose_a_force_is_sensed_without_shrinkage_and_as_a_passive_arm() -> None:
@@ -43,8 +43,8 @@ def test_at_every_pose_a_force_is_sensed_without_shrinkage_and_as_a_passive_arm(
     for _ in range(300):
         q = random.uniform(WAM.joints.lower, WAM.joints.upper)
         direction = random.normal(size=3)
-        pressed = PressedForce(OUTER, 0.28, 0.01, direction / np.linalg.norm(direction), 10.0)
-        axis = forces.axis(q, pressed)
+        pressed = ForcePlace(OUTER, 0.28, 0.01), direction / np.linalg.norm(direction), 10.0
+        axis = forces.axis(q, *pressed)
         if not math.isfinite(axis.force_sd):
             continue
         assert axis.sense @ axis.press == pytest.approx(1.0, rel=1e-6)
@@ -52,8 +52,8 @@ def test_at_every_pose_a_force_is_sensed_without_shrinkage_and_as_a_passive_arm(
         assert 0.0 < axis.speed_fraction <= 1.0
         assert axis.lever @ axis.move == pytest.approx(axis.speed_fraction)
         assert axis.speed_fraction * axis.apparent_mass <= 2.0 * (1.0 + 1e-9)
-        lightest = min(lightest, loose.axis(q, pressed).apparent_mass)
-        assert axis.force_sd >= loose.axis(q, pressed).force_sd * (1.0 - 1e-9), "passivity has its price"
+        lightest = min(lightest, loose.axis(q, *pressed).apparent_mass)
+        assert axis.force_sd >= loose.axis(q, *pressed).force_sd * (1.0 - 1e-9), "passivity has its price"
     assert lightest < 0.3, "without the least mass"
 
 
@@ -89,11 +89,11 @@ def test_a_force_is_known_worse_the_less_is_known(q: tuple[float, ...]) -> None:
     by_position = [axis_of(q, direction, sd=sd).force_sd for sd in (0.0, 0.01, 0.03, 0.1)]
     assert all(b > a for a, b in pairwise(by_position))
     more = ForceAxes(BODY, replace(SENSING, friction=2.0 * SENSING.friction))
-    pressed = PressedForce(OUTER, 0.28, 0.01, direction, 10.0)
-    assert more.axis(q, pressed).force_sd > axis_of(q, direction, sd=0.01).force_sd
+    pressed = ForcePlace(OUTER, 0.28, 0.01), direction, 10.0
+    assert more.axis(q, *pressed).force_sd > axis_of(q, direction, sd=0.01).force_sd
     forces = ForceAxes(BODY, SENSING)
-    other = forces.disturbance(q, PressedForce("inner_link", 0.3, 0.01, direction, 10.0))
-    assert forces.axis(q, pressed, other).force_sd > forces.axis(q, pressed).force_sd
+    other = forces.disturbance(q, ForcePlace("inner_link", 0.3, 0.01), direction, 10.0)
+    assert forces.axis(q, *pressed, other).force_sd > forces.axis(q, *pressed).force_sd
 
 
 def test_torques_of_the_force_alone_are_explained_and_others_are_not() -> None:

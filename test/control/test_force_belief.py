@@ -13,8 +13,7 @@ from arms import BODY, CONFIGURATION, WAM
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Errors, WorldTorques, belief, predicted, tolerance
 from wam_control.force.command_run import Shaking
-from wam_control.force.contact_place import ForcePlace
-from wam_control.force.force_axis import ForceAxes, Phasors, PressedForce
+from wam_control.force.force_axis import ForceAxes, ForcePlace, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import yielding
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
@@ -95,7 +94,7 @@ def test_the_predicted_error_is_that_of_random_torques_friction_and_position(q: 
 def test_without_a_lever_nothing_is_known() -> None:
     straight = (0.0, -1.0, 0.0, math.pi / 2.0)
     tip = BODY.point(straight, OUTER, (0.3, 0.0, 0.0))
-    sensed = FORCES.axis(straight, PressedForce(OUTER, 0.3, 0.0, tip / np.linalg.norm(tip), 10.0))
+    sensed = FORCES.axis(straight, ForcePlace(OUTER, 0.3, 0.0), tip / np.linalg.norm(tip), 10.0)
     axis = axis_at(straight)._replace(sensed=sensed)
     assert predicted(axis, SD, PLAIN).size == math.inf
 

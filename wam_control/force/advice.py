@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from wam_control.force.axes import Links, TaskAxes
 from wam_control.force.belief import Belief
-from wam_control.force.contact_place import ForcePlace
-from wam_control.force.force_axis import Angles
+from wam_control.force.force_axis import Angles, ForcePlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import TaskCommand
 from wam_control.force.thresholds import FORCE

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_control.force.contact_place import ForcePlace
-from wam_control.force.force_axis import UNTURNED, Angles, ForceAxes, ForceAxis, PressedForce
+from wam_control.force.force_axis import UNTURNED, Angles, ForceAxes, ForceAxis, ForcePlace
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import Array, RigidBody
@@ -93,25 +92,22 @@ class TaskAxes:
             for axis, side in zip(task.axes, sides, strict=True)
         ]
         in_frame = [sign * np.array(axis.direction) for axis, sign in zip(task.axes, signs, strict=True)]
-        pressed = [
-            place.pressed(rotation.dot(along), _size(axis))
-            for axis, place, along in zip(task.axes, places, in_frame, strict=True)
-        ]
-        is_alone = len(pressed) == 1
-        torques = [[] if is_alone else self._disturbance(q, *one) for one in zip(task.axes, pressed, strict=True)]
-        return [self._axis(q, i, task.axes, in_frame[i], pressed[i], torques, places[i]) for i in range(len(task.axes))]
+        directions = [rotation.dot(along) for along in in_frame]
+        each = zip(task.axes, places, directions, strict=True)
+        torques = [[] if len(places) == 1 else self._disturbance(q, *one) for one in each]
+        return [self._axis(q, i, task.axes, in_frame[i], directions[i], torques, places[i]) for i in range(len(places))]
 
     def rotation(self, q: Angles, frame: str) -> Array:
         """Rotation (3, 3) of the frame of a command into the base frame."""
         return UNTURNED if frame == BASE else self._body.cover_pose(q, frame).rotation
 
-    def _disturbance(self, q: Angles, axis: TaskAxis, pressed: PressedForce) -> list[Array]:
+    def _disturbance(self, q: Angles, axis: TaskAxis, place: ForcePlace, direction: Array) -> list[Array]:
         """Torques (n,), N m, by which a force along an axis disturbs the others; a hand has no friction."""
         if axis.joint >= 0 or not axis.is_sensed:
             return []
         if axis.kind is AxisKind.IMPEDANCE:
-            return [FORCE.hand * self.forces.lever(q, pressed.cover, pressed.position, pressed.direction)]
-        return self.forces.disturbance(q, pressed)
+            return [FORCE.hand * self.forces.lever(q, place.cover, place.position, direction)]
+        return self.forces.disturbance(q, place, direction, _size(axis))
 
     def _axis(
         self,
@@ -119,11 +115,11 @@ class TaskAxes:
         i: int,
         axes: Sequence[TaskAxis],
         in_frame: Array,
-        pressed: PressedForce,
+        direction: Array,
         torques: Sequence[list[Array]],
         place: ForcePlace,
     ) -> CommandedAxis:
-        axis, direction = axes[i], pressed.direction
+        axis = axes[i]
         if axis.joint >= 0:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
             return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, float(q[axis.joint]))
@@ -137,8 +133,8 @@ class TaskAxes:
             # two axes at one position are parts of one force, whose friction is that of `sensed` already
             is_same = (axes[k].cover, axes[k].position) == (axis.cover, axis.position)
             others += [] if k == i else each[:1] if is_same else each
-        sensed = self.forces.axis(q, pressed, others)
-        desired = pressed.force if axis.kind is AxisKind.FORCE else 0.0
+        sensed = self.forces.axis(q, place, direction, _size(axis), others)
+        desired = _size(axis) if axis.kind is AxisKind.FORCE else 0.0
         return CommandedAxis(axis, sensed.lever, direction, in_frame, desired, at, sensed, place)
 
 

@@ -219,8 +219,8 @@ class CommandRun:
             return
         force = axis.force(torques)
         if axis.sensed is not None and axis.place is not None and float(np.abs(torques).max()) <= limit:
-            pressed = axis.place.pressed(axis.direction, abs(force))
-            if force <= 0.0 or forces.axis(q, pressed).unexplained(torques) > FORCE.unexplained:
+            sensed = forces.axis(q, axis.place, axis.direction, abs(force))
+            if force <= 0.0 or sensed.unexplained(torques) > FORCE.unexplained:
                 return
         self.resting = np.zeros_like(torques)
 

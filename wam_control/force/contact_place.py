@@ -1,39 +1,14 @@
 """Where the controlled force acts: where the command or the parameters pin it, or at the estimated contact."""
 
 import math
-from typing import NamedTuple
 
-from wam_control.force.force_axis import PressedForce
+from wam_control.force.force_axis import ForcePlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import TaskAxis
 from wam_description.arm import Covers
-from wam_description.rigid_body import Array
 from wam_description.signals import BASE, Contact, ForceCommand, Triple
 
 STEEPEST = 0.5  # sine of the lean of a force from the normal of a link, up to which its position is estimated well
-
-
-class ForcePlace(NamedTuple):
-    """Where a force acts.
-
-    Attributes
-    ----------
-    cover, position, position_sd : cover, position along it and its standard deviation, m.
-    is_pinned : whether the command or the parameters give it.
-    is_known : whether it is pinned, or estimated well enough while something is touched.
-    is_touched : whether the contact is estimated to be on that cover, but no torque shows where.
-    """
-
-    cover: str
-    position: float
-    position_sd: float
-    is_pinned: bool = False
-    is_known: bool = False
-    is_touched: bool = False
-
-    def pressed(self, direction: Array, force: float) -> PressedForce:
-        """A force there, N, along a direction (3,), base frame."""
-        return PressedForce(self.cover, self.position, self.position_sd, direction, force)
 
 
 class ContactPlace:

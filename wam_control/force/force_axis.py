@@ -121,21 +121,23 @@ class ForceAxis(NamedTuple):
         return _unexplained(inverse(self.covariance_there), self.press, change)
 
 
-class PressedForce(NamedTuple):
-    """A force with which the arm is to press, and its position.
+class ForcePlace(NamedTuple):
+    """Where a force acts.
 
     Attributes
     ----------
-    cover, position, position_sd : where it acts, m along the cover, and how uncertain that is, m.
-    direction : unit vector of the force of the arm on the world (3,), base frame.
-    force : commanded, N; tangential forces are proportional to it.
+    cover, position, position_sd : cover, position along it and its standard deviation, m.
+    is_pinned : whether the command or the parameters give it.
+    is_known : whether it is pinned, or estimated well enough while something is touched.
+    is_touched : whether the contact is estimated to be on that cover, but no torque shows where.
     """
 
     cover: str
     position: float
     position_sd: float
-    direction: Array
-    force: float
+    is_pinned: bool = False
+    is_known: bool = False
+    is_touched: bool = False
 
 
 class ForceAxes:
@@ -214,12 +216,12 @@ class ForceAxes:
         result: Array = direction.dot(self._jacobian(q, cover, position, direction)[0])
         return result
 
-    def disturbance(self, q: Angles, pressed: PressedForce) -> list[Array]:
+    def disturbance(self, q: Angles, place: ForcePlace, direction: Array, force: float) -> list[Array]:
         """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
 
         Arguments as those of `axis`.
         """
-        cover, position, position_sd, direction, force = pressed
+        cover, position, position_sd = place[:3]
         size = max(force, FORCE.sized_force)
         jacobian, point, _ = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
@@ -259,17 +261,21 @@ class ForceAxes:
         force: Array = across + max(2.0 * most / slope - 1.0, 0.0) * aside
         return force / float(force.dot(direction))
 
-    def axis(self, q: Angles, pressed: PressedForce, others: Sequence[Array] = ()) -> ForceAxis:
+    def axis(
+        self, q: Angles, place: ForcePlace, direction: Array, force: float, others: Sequence[Array] = ()
+    ) -> ForceAxis:
         """The axis of a force at a contact.
 
         Parameters
         ----------
         q : joint angles (n,), rad.
-        pressed : the force.
+        place : where it acts.
+        direction : unit vector of the force of the arm on the world (3,), base frame.
+        force : commanded, N; tangential forces are proportional to it.
         others : torques (n,), N m, of other forces, each as large as its standard deviation.
         """
         parameters, n = self._parameters, len(q)
-        cover, position, position_sd, direction, force = pressed
+        cover, position, position_sd = place[:3]
         jacobian, point, along = self._jacobian(q, cover, position, direction)  # friction acts at the surface
         lever: Array = direction.dot(jacobian)
         square = float(lever.dot(lever))

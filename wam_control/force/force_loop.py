@@ -18,8 +18,8 @@ from wam_control.force.advice import tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import AxisRun, CommandRun
-from wam_control.force.contact_place import ContactPlace, ForcePlace, pinned_position
-from wam_control.force.force_axis import ForceAxes
+from wam_control.force.contact_place import ContactPlace, pinned_position
+from wam_control.force.force_axis import ForceAxes, ForcePlace
 from wam_control.force.force_command import CommandAdmission, beyond
 from wam_control.force.force_input import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters

@@ -43,7 +43,7 @@ class Knowledge(NamedTuple):
         torques, logs = self.torques.now, []
         for axis in able:
             assert axis.place is not None
-            there = self.forces.axis(q, axis.place.pressed(axis.direction, axis.force(torques)))
+            there = self.forces.axis(q, axis.place, axis.direction, axis.force(torques))
             chance = contact.probability
             if axis.place.cover != contact.cover:
                 chance = (1.0 - chance) / (len(axes) - 1)
@@ -73,7 +73,7 @@ class Knowledge(NamedTuple):
         # all but what no torque shows will be known, and the better the harder the arm presses
         sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
         place = place._replace(position_sd=max(sd, self.own.contact_position_sd))
-        touched = axis._replace(sensed=self.forces.axis(q, place.pressed(axis.direction, axis.desired)))
+        touched = axis._replace(sensed=self.forces.axis(q, place, axis.direction, axis.desired))
         return known._replace(errors=self._as_placed(touched).errors)
 
     def _as_placed(self, axis: CommandedAxis) -> Belief:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
+from wam_control.force.force_axis import ForceAxes, ForceAxis, ForcePlace, SensingParameters
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
 from wam_control.force.thresholds import FORCE, GUARD
@@ -218,8 +218,7 @@ class StabilityGuard:
 
     def axis(self, contact: GuardedContact) -> ForceAxis:
         """How the force loop senses the force of a contact, and moves along it."""
-        q, cover, position, position_sd, direction, force = contact
-        return self._force_axes.axis(q, PressedForce(cover, position, position_sd, np.array(direction), force))
+        return self._force_axes.axis(contact.q, ForcePlace(*contact[1:4]), np.array(contact.direction), contact.force)
 
     def scales(
         self, task: GuardedTask, contacts: Sequence[Guarded], tried: Sequence[float] = SCALES
