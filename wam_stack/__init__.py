@@ -132,7 +132,7 @@ def guard(configuration: Named = "wam") -> Report:
     mode = own.guard.mode
     if mode == "limit":
         own = replace(own, guard=replace(own.guard, mode="refuse"))
-    assessed = ForceLoop(shared.model_arm, shared.servo, own, shared.timing).report
+    assessed = ForceLoop(shared.model_arm, shared.servo, own, shared.timing).supervision.report
     return assessed._replace(facts=assessed.facts | ({"guard.mode": mode} if "domain" in assessed.facts else {}))
 
 

@@ -212,8 +212,8 @@ def _of_testbed(case: TestbedSet) -> ValidationRecord:
 def _assessment(configuration: Configuration) -> GuardAssessment:
     shared = configuration.shared
     loop = ForceLoop(shared.arm, shared.servo, configuration.node("force_loop", ForceLoopParameters), shared.timing)
-    assert loop.assessment is not None
-    return loop.assessment
+    assert loop.supervision.assessment is not None
+    return loop.supervision.assessment
 
 
 def _plant_end(configuration: Configuration, step: float, limit: float, gain: float, noise: float) -> str:

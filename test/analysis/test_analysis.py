@@ -333,7 +333,7 @@ def test_the_verdict_on_a_press_is_that_of_the_guard(moving: Recorded) -> None:
         assert words in found.sentence
         loop = replace(own, guard=replace(own.guard, mode="refuse"))  # the force loop itself takes it or does not
         if gain < 1.0:
-            taken = ForceLoop(recorded_set.arm, recorded_set.servo, loop, recorded_set.timing).assessment
+            taken = ForceLoop(recorded_set.arm, recorded_set.servo, loop, recorded_set.timing).supervision.assessment
             assert taken is not None
             assert found.assessment.scale >= taken.scale  # of one axis; the loop takes the worst of two
         else:
@@ -347,7 +347,7 @@ def test_predictions_are_for_the_gains_that_the_guard_admitted(moving: Recorded)
     arm, servo, timing, own = given.arm, given.servo, given.timing, given.force_loop
     assert arm is not None and servo is not None and timing is not None and own is not None  # noqa: PT018 - for mypy
     high = replace(own, force_gain=(2.0,))
-    loop = ForceLoop(arm, servo, high, timing)
+    loop = ForceLoop(arm, servo, high, timing).supervision
     assert loop.lowered.startswith("force_gain [0.")
     assert admitted(given._replace(force_loop=high)) == (given._replace(force_loop=loop.parameters), loop.lowered)
     assert admitted(given) == (given, "")

@@ -168,10 +168,10 @@ def test_gains_of_joint_torques_are_taken_down_before_the_arm_moves(gain: float,
     loop = Loop(replace(OWN, torque_gain=(gain,), torque_error_limit=(1e3,), limits=FREE))
     while not any(velocity):
         velocity = loop.step(ForceInput(state, 0.005, free, NO_CONTACT, torque=[0.0, 1.0, 0.0, 0.0])).velocity
-    assert loop.watch is not None
-    assert loop.watch.assessed
-    assert (loop.watch.factor < 0.3) is is_lowered
-    assert max(velocity) == pytest.approx(loop.watch.factor * gain, rel=1e-3)
+    assert loop.supervision.watch is not None
+    assert loop.supervision.watch.assessed
+    assert (loop.supervision.watch.factor < 0.3) is is_lowered
+    assert max(velocity) == pytest.approx(loop.supervision.watch.factor * gain, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -197,7 +197,7 @@ def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() 
     own = guarded(own, posture=(-2.07, -0.11, -0.26, 1.58))
     margins = []
     for cycle in (0, 40):
-        found = ForceLoop(ARM, SERVO, own, replace(CLOCK, dither_cycle=cycle)).assessment
+        found = ForceLoop(ARM, SERVO, own, replace(CLOCK, dither_cycle=cycle)).supervision.assessment
         assert found is not None
         margins.append(found.scale)
     assert margins[1] < 0.6 * margins[0]
@@ -209,7 +209,7 @@ def test_the_guard_relies_on_the_gains_of_the_velocity_loop() -> None:
     with pytest.raises(ParameterError, match="times the largest linearly stable one"):
         ForceLoop(ARM, STIFF, own, CLOCK)
     slightly = Servo(tuple(0.9 * gain for gain in SERVO.proportional_gain), SERVO.integral_gain)
-    usual, other = (ForceLoop(ARM, servo, own, CLOCK).assessment for servo in (SERVO, slightly))
+    usual, other = (ForceLoop(ARM, servo, own, CLOCK).supervision.assessment for servo in (SERVO, slightly))
     assert usual is not None
     assert other is not None
     assert other.scale != usual.scale
@@ -245,7 +245,7 @@ def test_mode_limit_lowers_the_posture_gain_where_the_velocity_loop_is_too_slow_
     ForceLoop(ARM, slow, replace(OWN, posture_gain=float(str(refusal.value).rpartition(" ")[2])), CLOCK)
     loop = ForceLoop(ARM, slow, guarded(OWN, mode="limit"), CLOCK)
     assert loop.parameters.posture_gain < 0.5 * OWN.posture_gain
-    assert "lowered to be stable: posture_gain [" in loop.report.message
+    assert "lowered to be stable: posture_gain [" in loop.supervision.report.message
 
 
 # ------------------------------------------------------------------------------- while it moves
@@ -262,8 +262,8 @@ def follow(
     for _ in range(periods):
         command = ForceCommand(cover, force)
         loop.step(ForceInput(state, 0.005, state, contact, [0.0] * len(q), command=command))
-    assert loop.watch is not None
-    return loop.watch.factor
+    assert loop.supervision.watch is not None
+    return loop.supervision.watch.factor
 
 
 STIFF_POSE = (-0.5, -0.3, 0.3, 1.3)  # where the joint sensors see the foam through a lesser margin than at the box
@@ -272,16 +272,16 @@ STIFF_POSE = (-0.5, -0.3, 0.3, 1.3)  # where the joint sensors see the foam thro
 @pytest.mark.slow
 def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_back() -> None:
     own = replace(OWN, force_gain=(0.09,))
-    loop = Loop(own)
-    here = list(own.guard.posture)
-    assert loop.report.facts["pose of margin here"].startswith("at `worst case`, until")
+    loop, here = Loop(own), list(own.guard.posture)
+    seen = loop.supervision
+    assert seen.report.facts["pose of margin here"].startswith("at `worst case`, until")
     assert follow(loop, here) == 1.0
-    assert loop.watch is not None
-    assert loop.report.facts["margin here"].startswith(f"{loop.watch.scale:.4g}"), "also where the factor stays"
+    assert seen.watch is not None
+    assert seen.report.facts["margin here"].startswith(f"{seen.watch.scale:.4g}"), "also where the factor stays"
     factor = follow(loop, STIFF_POSE)
     assert factor < 0.75
-    assert loop.report.facts["pose of margin here"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
-    assert f"each is multiplied by {factor:.3g}" in loop.report.message
+    assert seen.report.facts["pose of margin here"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
+    assert f"each is multiplied by {factor:.3g}" in seen.report.message
     guard = StabilityGuard(ARM, SERVO, CLOCK, own.guard, own.sensing)
     task = loop_task(loop)
     touch = GuardedContact(STIFF_POSE, "outer_link", 0.28, UNSURE, normal(guard, STIFF_POSE), 6.0)
@@ -298,10 +298,10 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
 def test_gains_far_above_their_margin_are_followed_where_the_guard_only_warns() -> None:
     own = guarded(bench(force_gain=(5.0,)), mode="warn")
     loop = bench_loop(own)
-    assert loop.assessment is not None
-    assert 0.0 < loop.assessment.scale < 0.01
+    assert loop.supervision.assessment is not None
+    assert 0.0 < loop.supervision.assessment.scale < 0.01
     assert follow(loop, own.guard.posture, force=(0.0, 1.0, 0.0)) == 0.0
-    assert loop.report.facts["gains multiplied by"] == "1"
+    assert loop.supervision.report.facts["gains multiplied by"] == "1"
 
 
 def loop_task(loop: ForceLoop) -> GuardedTask:
@@ -323,9 +323,9 @@ def test_the_velocity_obeys_the_factor() -> None:
     for _ in range(300):
         out = loop.step(ForceInput(state, 0.005, state, NO_CONTACT, command=command, posture=list(STIFF_POSE)))
         speeds.append(float(np.linalg.norm(out.velocity)) / abs(out.error[2]))
-    assert loop.watch is not None
-    assert loop.watch.factor < 0.75
-    assert speeds[-1] == pytest.approx(loop.watch.factor * speeds[0], rel=1e-6)
+    assert loop.supervision.watch is not None
+    assert loop.supervision.watch.factor < 0.75
+    assert speeds[-1] == pytest.approx(loop.supervision.watch.factor * speeds[0], rel=1e-6)
 
 
 ROD = changed(one_joint(), motors={"inertia": (2e-3,)}, joints={"viscous_friction": (4.0,)})
@@ -362,10 +362,10 @@ def test_a_force_that_turns_is_judged_again_though_the_arm_is_at_rest() -> None:
     for force in (along_y, along_z):
         loop = Loop(own)
         follow(loop, STIFF_POSE, force=force)
-        assert loop.watch is not None
-        fresh[force] = loop.watch.scale
+        assert loop.supervision.watch is not None
+        fresh[force] = loop.supervision.watch.scale
     assert abs(fresh[along_y] / fresh[along_z] - 1.0) > 0.1
     for force in (along_y, along_z):
         follow(loop, STIFF_POSE, force=force)
-        assert loop.watch is not None
-        assert loop.watch.scale == fresh[force]
+        assert loop.supervision.watch is not None
+        assert loop.supervision.watch.scale == fresh[force]

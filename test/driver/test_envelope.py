@@ -261,8 +261,7 @@ def admitted(
     posture: Sequence[float] | None = None,
     torque: Sequence[float] | None = None,
 ) -> CommandAdmission:
-    given = State(ARM.joints.start, [], [])
-    admission.step(own, ForceInput(given, DT, command=force, posture=posture, torque=torque))
+    admission.step(own, ForceInput(State(ARM.joints.start, [], []), DT, command=force, posture=posture, torque=torque))
     return admission
 
 

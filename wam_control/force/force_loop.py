@@ -25,7 +25,7 @@ from wam_control.force.force_input import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import Seen
-from wam_control.force.guard import Report, Supervision, Watch
+from wam_control.force.guard import Supervision
 from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
 from wam_control.force.knowledge import Knowledge
@@ -38,7 +38,7 @@ from wam_control.force.limits import (
     servo_yielding,
 )
 from wam_control.force.problem import VelocityRow, solve, unlimited
-from wam_control.force.stability_guard import GuardAssessment, triple
+from wam_control.force.stability_guard import triple
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
@@ -84,6 +84,7 @@ class ForceLoop:
 
     Attributes
     ----------
+    supervision : by the guard, with what it finds, does and reports.
     parameters : those in force; with guard.mode `limit` they may be lower than given.
     refusals : why a present command is refused, by topic; the last good one remains in use.
     events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
@@ -116,8 +117,8 @@ class ForceLoop:
         """
         arm = self._body.arm
         parameters.require_fit(arm)
-        self._supervision = Supervision(arm, self._servo, self._timing, parameters, tuple(self._q))
-        self.parameters = self._supervision.parameters
+        self.supervision = Supervision(arm, self._servo, self._timing, parameters, tuple(self._q))
+        self.parameters = self.supervision.parameters
         self._axes = TaskAxes(self._body, ForceAxes(self._body, parameters.sensing_fed_back))
 
     @property
@@ -129,26 +130,6 @@ class ForceLoop:
     def is_advised(self) -> bool:
         """Whether the event of a refused force has what would help: it is looked for over several periods."""
         return "searched" in self._run.ways
-
-    @property
-    def assessment(self) -> GuardAssessment | None:
-        """The guard's assessment of the parameters; None where it is off or nothing is fed back."""
-        return self._supervision.assessment
-
-    @property
-    def watch(self) -> Watch | None:
-        """What the guard does while the arm moves; None with the assessment."""
-        return self._supervision.watch
-
-    @property
-    def lowered(self) -> str:
-        """Which parameters the guard has lowered, and to what; '' where none."""
-        return self._supervision.lowered
-
-    @property
-    def report(self) -> Report:
-        """The guard's report; a new object where it has changed."""
-        return self._supervision.report
 
     @property
     def free_torques(self) -> list[float]:
@@ -237,16 +218,14 @@ class ForceLoop:
     def _begin(self, task: TaskCommand | None, key: tuple[object, ...], is_free: bool = False) -> None:
         """Something else is commanded: what a free arm at rest measures is the error of its model."""
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
-        still_sd = measurement.torques.sd
-        is_at_rest = measurement.speed < MOTION.at_rest
-        resting = np.zeros(len(self._velocity))
-        if task is not None and limit and self._has_left and is_at_rest:
+        before, still_sd, resting = self._run, measurement.torques.sd, np.zeros(len(self._velocity))
+        is_zeroed = task is not None and bool(limit)
+        if is_zeroed and self._has_left and measurement.speed < MOTION.at_rest:
             if is_free:
                 measurement.zero(limit)
             resting = measurement.resting
-        is_moving = task is not None and bool(limit) and measurement.speed > FORCE.fast
-        arm, before = self._body.arm, self._run
-        self._run = CommandRun(key, task, arm, self._timing, self._pose, resting, still_sd, is_moving)
+        is_moving = is_zeroed and measurement.speed > FORCE.fast
+        self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.go_on(before)
 
     def _find_axes(self, task: TaskCommand | None, contact: Contact) -> None:
@@ -319,7 +298,7 @@ class ForceLoop:
         dt: float,
     ) -> tuple[Array, list[float], list[Event]]:
         """Joint velocities and torques (n,), and what limits them."""
-        own, run, sensing, supervision = self.parameters, self._run, self._axes.forces, self._supervision
+        own, run, sensing, supervision = self.parameters, self._run, self._axes.forces, self.supervision
         axes = [one.now for one in run.axes]
         holds = any(event.holds for event in found)
         if axes:
@@ -377,7 +356,7 @@ class ForceLoop:
         """The commanded velocity along each axis; none while the arm is watched before it moves."""
         run, own = self._run, self.parameters
         speeds = [self._speed(one, dt) for one in run.axes]
-        watch = self._supervision.watch
+        watch = self.supervision.watch
         is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_force for one in run.axes)
         if is_watching or not is_assessed:
             speeds = [0.0] * len(speeds)
@@ -408,11 +387,11 @@ class ForceLoop:
 
     def _force_speed(self, one: AxisRun, dt: float) -> float:
         """The law of a force or a torque, as fast as the limits allow."""
-        own, axis, known, factor = self.parameters, one.now, one.known, self._supervision.factor
+        own, axis, known, factor = self.parameters, one.now, one.known, self.supervision.factor
         if axis.sensed is None:
             error, before = axis.desired - known.force, axis.desired - known.before
-            return factor * self._supervision.torque_law.velocity(axis.of.joint, error, before, dt)
-        law, expected = self._supervision.force_law.along(axis.in_frame.tolist()), one.expected(own, dt)
+            return factor * self.supervision.torque_law.velocity(axis.of.joint, error, before, dt)
+        law, expected = self.supervision.force_law.along(axis.in_frame.tolist()), one.expected(own, dt)
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
             one.is_kept = one.watch.touch.is_there and abs(axis.desired - known.force) < band
@@ -421,7 +400,7 @@ class ForceLoop:
         error = expected - known.force
         speed = factor * one.watch.oscillation.share * law.velocity(0, error, expected - known.before, dt)
         if axis.desired:  # back no faster than the measured force can follow
-            slack = servo_yielding(axis, self._supervision.servo_stiffness, own)
+            slack = servo_yielding(axis, self.supervision.servo_stiffness, own)
             most = approach_speed(axis, one.watch.touch.is_there, own, slack)
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
@@ -457,7 +436,7 @@ class ForceLoop:
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._pose).dot(torques.acceleration)
         chi2 = max([one.known.chi2 for one in run.axes], default=0.0)
-        gain = self._supervision.factor * max(own.force_gain)
+        gain = self.supervision.factor * max(own.force_gain)
         return self._pushed.step(
             self._pose, forces, now, torques.sd, contact, chi2, min(bounds), bool(pressed), is_bouncing, gain, own, dt
         )
@@ -526,7 +505,7 @@ class ForceLoop:
         for one in each:
             axis, known = one.now, one.known
             if axis.is_force and axis.sensed is not None:
-                law, off = self._supervision.force_law.along(axis.in_frame.tolist()), axis.desired - known.force
+                law, off = self.supervision.force_law.along(axis.in_frame.tolist()), axis.desired - known.force
                 sums += np.outer([known.force, off, law.limited(0, off)], axis.in_frame)
         measured, error, limited = map(triple, sums)
         return ForceOutput(

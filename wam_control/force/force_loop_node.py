@@ -139,7 +139,7 @@ class ForceLoopNode:
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
-        report, events = self._loop.report, self._loop.events
+        report, events = self._loop.supervision.report, self._loop.events
         refusals = self.refusals
         commanded = ""
         if refusals or self._loop.event.holds:  # of the command for which it was given
@@ -177,12 +177,12 @@ class ForceLoopNode:
     @property
     def guard_report(self) -> Report:
         """What the guard reports of the parameters in use."""
-        return self._loop.report
+        return self._loop.supervision.report
 
     @property
     def lowered(self) -> str:
         """What applies in place of parameters that the guard does not accept; '' where it accepts all."""
-        return self._loop.lowered
+        return self._loop.supervision.lowered
 
     def tare(self) -> Answer:
         """Take the present external torques as zero."""

@@ -27,7 +27,7 @@ class Lasting:
     """A condition that starts when it was true for some time, and ends when it was false for some time."""
 
     def __init__(self) -> None:
-        self._level, self.is_on = 0.0, False
+        self._level, self.is_on, self._last = 0.0, False, list[Event]()
 
     def step(self, is_there: bool, after: float, back: float, dt: float) -> bool:
         """One period of dt, s; it begins `after` s with the condition, and ends `back` s without it."""
@@ -37,6 +37,11 @@ class Lasting:
         self._level = min(max(self._level + change, 0.0), 1.0)
         self.is_on = self._level > 1.0 - FORCE.rounding or (self.is_on and self._level > FORCE.rounding)
         return self.is_on
+
+    def report(self, event: Event | None, after: float, back: float, dt: float) -> list[Event]:
+        """An event that lasts, with the values that it last had; arguments as those of `step`."""
+        self._last = [event] if event else self._last
+        return [*self._last] if self.step(event is not None, after, back, dt) else []
 
 
 class Turns:
@@ -95,14 +100,13 @@ class Oscillation:
     def __init__(self) -> None:
         self.share = 1.0
         self._turns, self._faint, self._lasting = Turns(), Turns(), Lasting()
-        self._values: dict[str, Value] = {}
 
     def rest(self) -> None:
         """There is nothing to see yet."""
         self._turns, self._faint = Turns(), Turns()
 
-    def step(self, force: float, desired: float, sd: float, own: ForceLoopParameters, dt: float) -> Event | None:
-        """The event of one period.
+    def step(self, force: float, desired: float, sd: float, own: ForceLoopParameters, dt: float) -> list[Event]:
+        """The event of one period, or none.
 
         Parameters
         ----------
@@ -115,18 +119,22 @@ class Oscillation:
         count = self._turns.step(force, least, window, dt)
         # a cycle that grows is seen late, and with a wrong size; one that is slower than the loop is not its own
         faint = self._faint.step(force, FORCE.faint_swing * least, FORCE.turns * own.rise_time, dt)
-        is_swinging = count > FORCE.turns
-        if is_swinging:
+        event = None
+        if count > FORCE.turns:
             swing, period = self._turns.swing
-            source, allowed = _source(own), own.limits.cycle_force
-            self._values = {
-                "swing": swing, "period": period, "desired": desired, "allowed": allowed, "source": source
-            }  # fmt: skip
+            event = warning(
+                Code.OSCILLATING,
+                "oscillating",
+                swing=swing,
+                period=period,
+                desired=desired,
+                allowed=own.limits.cycle_force,
+                source=_source(own),
+            )
         if faint > FORCE.turns // 2 and self.share > FORCE.least_share:
             self.share *= FORCE.slowed
             self.rest()
-        is_on = self._lasting.step(is_swinging, dt, window, dt)
-        return warning(Code.OSCILLATING, "oscillating", **self._values) if is_on else None
+        return self._lasting.report(event, dt, window, dt)
 
 
 class Seen(NamedTuple):
@@ -167,8 +175,6 @@ class ForceWatch:
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
         self._is_refused, self._is_decided, self._has_settled = True, False, False
         self._desired, self._travel = math.nan, 0.0
-        # values of what is stated for some time after it last was so
-        self._doubted, self._differing = dict[str, Value](), dict[str, Value]()
         self._pattern: Array | None = None  # m, torques per force that it did not explain as it settled
 
     def step(self, axis: CommandedAxis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
@@ -199,17 +205,25 @@ class ForceWatch:
         soon, late = FORCE.quarter * lasting, lasting
         after, back = (soon, late) if self._has_settled else (late, soon)
         if self._off.step(not is_reached, after, back, dt):
-            values: dict[str, Value] = {"measured": known.force, "desired": desired, "time": after, "unit": _unit(axis)}
-            values["has_touched"] = float(self.touch.is_there)
-            cause = "force_strays" if self._has_settled else "force_off"
-            events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
+            event = warning(
+                Code.NOT_REACHED,
+                "force_strays" if self._has_settled else "force_off",
+                axis=axis.of.name,
+                allowed=known.tolerance,
+                measured=known.force,
+                desired=desired,
+                time=after,
+                unit=_unit(axis),
+                has_touched=float(self.touch.is_there),
+            )
+            events.append(event)
         # a force that rises too far is only crossed
         self._has_settled = self._right.step(is_reached, soon, dt, dt) or self._has_settled
         events += self._unexplained(axis, known, torques, own, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
             sd = own.sensing.torque_sd
             sd = axis.sensed.error(sd) if axis.sensed else sd
-            events += filter(None, [self.oscillation.step(known.force, desired, sd, own, dt)])
+            events += self.oscillation.step(known.force, desired, sd, own, dt)
         else:
             self.oscillation.rest()
         return events
@@ -228,12 +242,10 @@ class ForceWatch:
         # what is off already leaves less of the tolerance to what is not known; what is off by all of it is not reached
         off = error if abs(error) <= known.tolerance else 0.0
         error = math.hypot(known.errors.size, off)
-        is_doubtful = error > known.tolerance and self.touch.is_there
-        lasting = own.limits.settling_time
-        if is_doubtful:
-            self._doubted = self._wrong(error, axis, known, own)
-        is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
-        return [warning(Code.REFUSED, "uncertain", **self._doubted)] if is_on else []
+        event, lasting = None, own.limits.settling_time
+        if error > known.tolerance and self.touch.is_there:
+            event = warning(Code.REFUSED, "uncertain", **self._wrong(error, axis, known, own))
+        return self._doubt.report(event, lasting, lasting, dt)
 
     def _wrong(self, error: float, axis: CommandedAxis, known: Belief, own: ForceLoopParameters) -> dict[str, Value]:
         """By how much a force may be wrong, N, and why."""
@@ -274,13 +286,14 @@ class ForceWatch:
         if axis.sensed is None or axis.place is None or known.sd == math.inf:
             return []
         where: dict[str, Value] = {"cover": axis.place.cover, "position": axis.place.position}
-        is_strange = known.chi2 > FORCE.unexplained and self.touch.is_there
-        lasting = own.limits.settling_time
-        if is_strange:
-            source = _source(own, self._is_dithered)
-            self._differing = {**where, "chi2": known.chi2, "allowed": FORCE.unexplained, "source": source}
-        if self._strange.step(is_strange, lasting, lasting, dt):
-            return [warning(Code.UNEXPLAINED, "torques_differ", **self._differing)]
+        event, lasting = None, own.limits.settling_time
+        if known.chi2 > FORCE.unexplained and self.touch.is_there:
+            source, allowed = _source(own, self._is_dithered), FORCE.unexplained
+            event = warning(
+                Code.UNEXPLAINED, "torques_differ", **where, chi2=known.chi2, allowed=allowed, source=source
+            )
+        if found := self._strange.report(event, lasting, lasting, dt):
+            return found
         if self._right.is_on and self._pattern is None:
             # with the pose the torques of the force change, too; what is estimated moves with whatever else pushes
             self._pattern = torques / known.force + axis.sensed.press * axis.place.is_pinned
