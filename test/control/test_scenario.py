@@ -58,7 +58,7 @@ def touching(newtons: float) -> Contact:
 def test_path_has_the_smallest_jerk() -> None:
     outs = play(Scenario([ScenarioStep("go", 1.0, tuple(GOAL)), ScenarioStep("stay", 1.0)]), 300)
     assert outs[0].posture == START
-    assert [(out.posture, out.step) for out in outs[201:]] == [(GOAL, "stay")] * 99
+    assert [(out.posture, out.step.name) for out in outs[201:]] == [(GOAL, "stay")] * 99
     for joint in range(4):
         path = np.array([out.posture[joint] for out in outs])
         reach = GOAL[joint] - START[joint]
@@ -73,7 +73,7 @@ def test_path_has_the_smallest_jerk() -> None:
 def test_the_next_path_goes_on_where_the_last_one_ended_even_if_the_arm_is_elsewhere() -> None:
     scenario = Scenario([ScenarioStep("there", 0.1, tuple(GOAL)), ScenarioStep("back", 0.1, tuple(START))])
     outs = play(scenario, 20) + play(scenario, 1, q=[9.0] * 4) + play(scenario, 20)
-    assert outs[20].step == "back"
+    assert outs[20].step.name == "back"
     assert outs[20].posture == GOAL
     steps = np.abs(np.diff([out.posture for out in outs], axis=0))
     assert np.max(steps) < 0.04, "no jump anywhere"
@@ -85,7 +85,7 @@ def test_after_pressing_the_path_starts_from_the_measured_pose(last: ScenarioSte
     play(scenario, 40)
     sunk = [0.21, -1.07, 0.1, 0.75]
     out = play(scenario, 1, q=sunk)[0]
-    assert out.step == last.name
+    assert out.step == last
     assert out.posture == sunk
     assert out.force == NO_FORCE
 
@@ -119,9 +119,9 @@ def test_a_force_rises_from_that_of_the_step_before_in_its_own_frame() -> None:
 
 def test_a_step_until_a_force_ends_when_it_is_detected() -> None:
     scenario = Scenario([ScenarioStep("lower", 1.0, tuple(GOAL), until_force=2.0), ScenarioStep("then", 1.0)])
-    assert play(scenario, 20, contact=touching(1.9))[-1].step == "lower"
+    assert play(scenario, 20, contact=touching(1.9))[-1].step.name == "lower"
     out = play(scenario, 1, q=[0.1] * 4, contact=touching(-2.0))[0]
-    assert out.step == "then"
+    assert out.step.name == "then"
     assert out.failure == ""
     assert out.posture == [0.1] * 4, "it presses no harder"
     assert play(scenario, 10)[-1].posture == out.posture
@@ -145,7 +145,7 @@ def test_requests_and_settings_are_made_once_when_their_step_begins() -> None:
     steps = [ScenarioStep("on", 0.02, request="enable"), ScenarioStep("rub", 0.02, settings=settings)]
     outs = play(Scenario([*steps, ScenarioStep("off", 0.02, request="disable")]), 14)
     assert [(k, out.request) for k, out in enumerate(outs) if out.request] == [(0, "enable"), (8, "disable")]
-    assert [(k, out.settings) for k, out in enumerate(outs) if out.settings] == [(4, settings)]
+    assert [(k, out.step.settings) for k, out in enumerate(outs) if out.begins] == [(0, ()), (4, settings), (8, ())]
     assert [out.done for out in outs] == [False] * 12 + [True] * 2
     assert outs[-1].failure == ""
 
@@ -155,18 +155,18 @@ def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_pa
     push = {"cover": "inner_link", "contact_position": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
     steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), SHARED)
     out = play(Scenario(steps, SHARED), 1)[0]
-    np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
+    np.testing.assert_allclose(out.push.torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
     same = ScenarioStep("a", 0.2, push=Push("inner_link", 0.5588, (0.0, 10.0, 0.0), 0.0, 0.1))
-    np.testing.assert_allclose(play(Scenario([same], SHARED), 1)[0].push_torque, out.push_torque, rtol=1e-9)
+    np.testing.assert_allclose(play(Scenario([same], SHARED), 1)[0].push.torque, out.push.torque, rtol=1e-9)
 
 
 def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_without_a_pause(tmp_path: Path) -> None:
     push = {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 10.0, 0.0]}
     names = [{"name": name, "seconds": 0.1, "push": push} for name in "ab"]
     outs = play(Scenario(load(write(tmp_path, {"steps": [*names, {"name": "c", "seconds": 0.1}]}), SHARED)), 60)
-    assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(40))
+    assert [k for k, out in enumerate(outs) if any(out.push.force)] == list(range(40))
     outs = play(Scenario(load(write(tmp_path, {"steps": [{**names[0], "push": {**push, "end": 0.1}}]}), SHARED)), 30)
-    assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(20))
+    assert [k for k, out in enumerate(outs) if any(out.push.force)] == list(range(20))
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_withou
 def test_a_push_between_two_outer_periods_lasts_for_one(begin: float, end: float, acts: list[int]) -> None:
     push = Push("outer_link", 0.3, (0.0, 10.0, 0.0), begin, end)
     outs = play(Scenario([ScenarioStep("pushed", 0.2, push=push), ScenarioStep("free", 0.1)]), 50)
-    assert [k for k, out in enumerate(outs) if any(out.push_force)] == acts
+    assert [k for k, out in enumerate(outs) if any(out.push.force)] == acts
 
 
 def test_every_scenario_that_comes_with_the_package_can_be_loaded() -> None:

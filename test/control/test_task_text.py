@@ -112,10 +112,10 @@ def test_a_posture_that_moves_a_joint_of_the_task_is_refused(
 def test_a_step_streams_its_task_and_takes_it_back(tmp_path: Path) -> None:
     steps = [step_of(tmp_path, torque=[0.0] * 4), ScenarioStep("rest", 1.0)]
     scenario = Scenario(steps, SHARED)
-    assert scenario.step(START, NO_CONTACT, 0.005).task is scenario.steps[0].task
+    assert scenario.step(START, NO_CONTACT, 0.005).step.task is scenario.steps[0].task
     elsewhere = [0.1, -1.1, 0.2, 0.3]
     outs = [scenario.step(elsewhere, NO_CONTACT, 0.5) for _ in range(2)]
-    assert outs[-1].task is None
+    assert outs[-1].step.task is None
     assert outs[-1].posture == elsewhere, "the arm stays where the task has taken it"
 
 

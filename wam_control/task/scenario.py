@@ -30,7 +30,7 @@ from wam_description.arm import Arm, Covers, Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint, PosturePath, Triple
+from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint, PosturePath, Triple, Wrench
 
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; required",
@@ -148,20 +148,15 @@ PARTS = {"force": ForceCommand, "push": Push, "chirp": Chirp, "trajectory": Post
 class ScenarioOutput(NamedTuple):
     """Commands of the scenario in one outer period."""
 
-    posture: list[float]
-    force: ForceCommand
-    push_cover: str
-    push_force: tuple[float, float, float]
-    push_torque: tuple[float, float, float]
-    request: str
-    settings: tuple[Setting, ...]
-    step: str
+    step: ScenarioStep
     begins: bool  # the step, in this period
     done: bool
     failure: str
-    commands_arm: bool  # in this step
-    task: TaskCommand | None = None
-    rate: Sequence[float] = ()  # rad/s, of a posture that moves; empty where it is not known
+    posture: list[float]
+    rate: Sequence[float]  # rad/s, of a posture that moves; empty where it is not known
+    force: ForceCommand
+    push: Wrench
+    request: str
 
 
 class Scenario:
@@ -228,23 +223,20 @@ class Scenario:
         if self._motion is not None and not self.done:
             self._posture, rate = self._motion.at(self._elapsed)
         push = step.push
-        acting = push if push and push.acts(self._elapsed, dt) and not self.done else None
+        pushed = Wrench(push.cover if push else BASE, ZERO, ZERO)
+        if push and push.acts(self._elapsed, dt) and not self.done:
+            pushed = Wrench(push.cover, push.force, push.torque(self._covers))
         request = "disable" if self.failure else step.request
         return ScenarioOutput(
-            posture=list(self._posture),
-            force=NO_FORCE if self.done else self._force(step),
-            push_cover=push.cover if push else "",
-            push_force=acting.force if acting else ZERO,
-            push_torque=acting.torque(self._covers) if acting else ZERO,
-            request=request if begins else "",
-            settings=step.settings if begins and not self.done else (),
-            step=step.name,
-            begins=begins and not self.done,
-            done=self.done,
-            failure=self.failure,
-            commands_arm=step.commands_arm,
-            task=None if self.done else step.task,
-            rate=rate,
+            step,
+            begins and not self.done,
+            self.done,
+            self.failure,
+            list(self._posture),
+            rate,
+            NO_FORCE if self.done else self._force(step),
+            pushed,
+            request if begins else "",
         )
 
     def _begin(self, index: int, q: Sequence[float]) -> None:

@@ -1,5 +1,6 @@
 """Node `scenario`: plays a task into the stack, as a user's program would."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from wam_control.contact.contact_table import contact_of
@@ -9,7 +10,7 @@ from wam_control.task.scenario_settings import Setting
 from wam_description.arm import Shared
 from wam_description.event import Code, Event, Level
 from wam_description.event_text import sentences
-from wam_description.signals import BASE, NodeStatus, State, Wrench
+from wam_description.signals import NodeStatus, State, Wrench
 from wam_description.status import ENABLED
 from wam_description.wiring import Call, Input, Inputs, Outputs, SetParameters, reaction
 
@@ -61,31 +62,31 @@ class ScenarioNode:
         out = self._scenario.step(inputs["joint_states"].position, contact, inputs.dt)
         if (out.begins or out.done) and self._commands_arm and not self._was_enabled:
             return self._end(f"step '{self._step}': {BRAKED}")
-        if out.request or out.settings or out.done:
-            self._request(out)
-        force = out.force
+        step, force = out.step, out.force
+        settings = step.settings if out.begins else ()
+        self._request(out, settings)
         outputs: dict[str, Any] = {
             "joint_posture_command": State(out.posture, list(out.rate), []),
             "force_command": Wrench(force.frame, force.force, force.torque),
-            "task_command": table_of(out.task, self._covers),
-            "sim/disturbance": Wrench(out.push_cover or BASE, out.push_force, out.push_torque),
+            "task_command": table_of(None if out.done else step.task, self._covers),
+            "sim/disturbance": out.push,
         }
         if out.done:
             return {**outputs, **self._end(out.failure)}
         if out.begins:  # it may have the name of the one before
-            self._step, self._commands_arm = out.step, out.commands_arm
-            facts = {f"{s.node}:{s.name}": str(_plain(s)) for s in out.settings}
-            outputs["status"] = NodeStatus(Level.OK, out.step, step=out.step, stamp=inputs.stamp, facts=facts)
+            self._step, self._commands_arm = step.name, step.commands_arm
+            facts = {f"{s.node}:{s.name}": str(_plain(s)) for s in settings}
+            outputs["status"] = NodeStatus(Level.OK, step.name, step=step.name, stamp=inputs.stamp, facts=facts)
         return outputs
 
-    def _request(self, out: ScenarioOutput) -> None:
+    def _request(self, out: ScenarioOutput, settings: Sequence[Setting]) -> None:
         if out.request:
             self._was_enabled |= out.request == "enable"  # or this one fails
             is_tare = out.request == "tare"
             call = Call("force_loop", "tare") if is_tare else Call("driver", "enable", out.request == "enable")
             self.requests.append(call)
-        for node in dict.fromkeys(setting.node for setting in out.settings):
-            values = {setting.name: _plain(setting) for setting in out.settings if setting.node == node}
+        for node in dict.fromkeys(setting.node for setting in settings):
+            values = {setting.name: _plain(setting) for setting in settings if setting.node == node}
             self.requests.append(SetParameters(node, values))
         if out.done:  # all nodes end with this one; the time of a real arm cannot be stopped
             self.requests.append(Call("driver", *(("pause", True) if self._is_simulated else ("enable", False))))
