@@ -18,6 +18,7 @@ from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Covers, Servo, Timing
 from wam_description.rigid_body import Array
+from wam_description.signals import BASE
 
 
 class AxisRun:
@@ -177,7 +178,7 @@ class CommandRun:
         still_sd: Array,
         is_moving: bool,
     ) -> None:
-        self.key, self.frame = key, task.frame if task else ""
+        self.key, self.frame = key, task.frame if task else BASE
         self.axes = [AxisRun(axis, arm.covers, timing.dither_cycle > 0) for axis in (task.axes if task else ())]
         self.held_at: Array | None = None
         self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()

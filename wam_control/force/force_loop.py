@@ -158,7 +158,7 @@ class ForceLoop:
 
     def step(self, given: ForceInput) -> ForceOutput:
         """One outer period: the axes of what is commanded, then what is known of them, then the motion, then events."""
-        own, joints, dt = self.parameters, given.joints, given.dt
+        own, joints, admitted = self.parameters, given.joints, self._admission
         is_braked, is_first = not any(joints.effort), not self._q
         self._q, self._pose = list(joints.position), np.array(joints.position)
         if is_braked or is_first:
@@ -172,31 +172,30 @@ class ForceLoop:
             topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
             given = given._replace(task=TaskCommand(BASE, torques), torque=None)
         if given.task is None and self._run.key[:1] == (TaskCommand,):
-            self._admission.restart(self._q)  # the arm stays where it is
-        admitted = self._admission
+            admitted.restart(self._q)  # the arm stays where it is
         admitted.step(own, given)
         self.refusals = admitted.refusals
         task, key = _task(admitted.force, given.task, own)
         if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
             self._begin(task, key, given.contact is not None and not contact.cover)
         self._find_axes(task, contact)
-        frame = task.frame if task else BASE
         if own.mode == "open_loop" and given.task is None:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(self._q)))
             self.events = ()
-            return ForceOutput([], effort.tolist(), frame=frame)
-        rate = given.rate if given.rate and admitted.posture == given.posture else None
-        found = self._watch(contact, rate is not None, dt) if self._run.axes else []
+            return ForceOutput([], effort.tolist(), frame=self._run.frame)
+        if admitted.posture != given.posture:
+            given = given._replace(rate=None)
+        found = self._watch(given) if self._run.axes else []
         if given.task is not None and (reason := beyond(given.task, own)):
             found.append(holding(Code.REFUSED, "task", reason=reason))
-        velocity, fed, limits = self._move(found, contact, admitted.posture, rate, is_braked, dt)
-        found += limits
-        found += self._watch_motions(found, admitted.posture if given.posture is not None else None, rate, dt)
+        velocity, fed, limits = self._move(found, given)
+        found += limits + ([] if self._pushed.event is None or is_braked else [self._pushed.event])
+        found += self._watch_motions(found, given)
         self.events = by_seriousness(self._advised(found, task))
         if self.event.holds:
             self.refusals[topic] = self.event
         self._velocity = velocity
-        return self._output(velocity, fed, frame, given.task is not None)
+        return self._output(velocity, fed, given.task is not None)
 
     def _measurable(self, given: ForceInput) -> ForceInput:
         """Without the signals that are fed back, a force would grow without bounds."""
@@ -251,10 +250,10 @@ class ForceLoop:
             lean = abs(float(direction.dot(along)))
         return memory.step(axis, contact, lean, self.parameters)
 
-    def _watch(self, contact: Contact, is_led: bool, dt: float) -> list[Event]:
+    def _watch(self, given: ForceInput) -> list[Event]:
         """What is known of each axis, and what its watch reports."""
         own, run, forces, torques = self.parameters, self._run, self._axes.forces, self._measurement.torques
-        q = self._pose
+        q, contact = self._pose, given.contact or NO_CONTACT
         moved = q - run.before
         run.before = q
         run.judge(q, self._measurement, forces, own.sensing.zero_limit)
@@ -265,7 +264,7 @@ class ForceLoop:
         found: list[Event] = []
         if run.is_moving:
             found.append(holding(Code.REFUSED, "moved_fast", speed=FORCE.fast))
-        is_led = is_led or not all(one.now.is_force for one in run.axes)
+        is_led = bool(given.rate) or not all(one.now.is_force for one in run.axes)
         covers = {one.of.cover for one in run.axes if one.now.place}
         probable = contact.probability >= own.link_probability_limit
         touched = contact.cover if covers and probable and not covers & {"", contact.cover} else ""
@@ -274,10 +273,11 @@ class ForceLoop:
             if not (axis.is_force and axis.desired):
                 continue
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
-            one.watch.touch.step(force, size, dt)
+            one.watch.touch.step(force, size, given.dt)
             way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(moved))
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
-            found += one.watch.step(axis, Seen(known, way, touched if is_touched else "", is_led), torques.now, own, dt)
+            seen = Seen(known, way, touched if is_touched else "", is_led)
+            found += one.watch.step(axis, seen, torques.now, own, given.dt)
         if run.is_touching and not any(event.holds for event in found):
             self._pressed_at = q
         if not (contact.cover or run.is_touching):
@@ -288,18 +288,10 @@ class ForceLoop:
     def _knowledge(self) -> Knowledge:
         return Knowledge(self._run, self._measurement.torques, self._axes.forces, self.parameters)
 
-    def _move(
-        self,
-        found: Sequence[Event],
-        contact: Contact,
-        posture: Sequence[float],
-        rate: Sequence[float] | None,
-        is_braked: bool,
-        dt: float,
-    ) -> tuple[Array, list[float], list[Event]]:
+    def _move(self, found: Sequence[Event], given: ForceInput) -> tuple[Array, list[float], list[Event]]:
         """Joint velocities and torques (n,), and what limits them."""
         own, run, sensing, supervision = self.parameters, self._run, self._axes.forces, self.supervision
-        axes = [one.now for one in run.axes]
+        axes, contact, dt = [one.now for one in run.axes], given.contact or NO_CONTACT, given.dt
         holds = any(event.holds for event in found)
         if axes:
             supervision.step(lambda: guarded(self._q, axes, contact, sensing, own, supervision), dt)
@@ -318,8 +310,8 @@ class ForceLoop:
         else:
             run.held_at = None
             rows = self._rows(is_watching, dt) if axes else []
-            wanted = self._towards(np.array(posture) + run.approached, rate)
-            if rate is None:
+            wanted = self._towards(np.array(self._admission.posture) + run.approached, given.rate)
+            if not given.rate:
                 wanted = self._slowed(rows, wanted)
         least = self._pushes(forces, contact, holds, allowed, dt)
         step = own.limits.joint_acceleration * dt or math.inf
@@ -327,9 +319,7 @@ class ForceLoop:
             step = math.inf  # a stiff hand would make a late arm swing
         low, high = joint_bounds(self._q, self._body.arm.joints, own, self._velocity.tolist(), step)
         velocity, free = solve(rows, wanted, least, low, high)
-        limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
-        if velocity is not free:
-            limits += self._at_ends(free, velocity)
+        limits = [] if velocity is free else self._at_ends(free, velocity)
         fed = run.fed_forward(holds, own)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
             countered = _dry_friction(self._body.arm, self._map, velocity.tolist())
@@ -453,13 +443,7 @@ class ForceLoop:
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _watch_motions(
-        self,
-        found: Sequence[Event],
-        posture: Sequence[float] | None,
-        rate: Sequence[float] | None,
-        dt: float,
-    ) -> list[Event]:
+    def _watch_motions(self, found: Sequence[Event], given: ForceInput) -> list[Event]:
         """What the motions of a task do not reach, or a posture where it is all there is."""
         own, run = self.parameters, self._run
         if any(event.holds or event.code is Code.PUSHED for event in found):
@@ -471,12 +455,12 @@ class ForceLoop:
                 axis, of, goal = one.now, one.now.of, one.goal(0.0, math.inf)
                 law = own.task.largest_rate, own.task.fastest(axis.is_joint)[0]
                 moving.append((of.name, of.unit, goal, of.speed, axis.at, *law))
-        if not run.axes and posture is not None:
-            law, rates = (own.posture_gain, own.joint_speed_limit), rate or [0.0] * len(self._q)
-            each = zip(self._body.arm.joints.names, posture, rates, self._q, strict=True)
+        if not run.axes and given.posture is not None:
+            law, rates = (own.posture_gain, own.joint_speed_limit), given.rate or [0.0] * len(self._q)
+            each = zip(self._body.arm.joints.names, self._admission.posture, rates, self._q, strict=True)
             moving = [(name, "rad", goal, speed, at, *law) for name, goal, speed, at in each]
         lasting = FORCE.quarter * own.limits.settling_time
-        events = [run.motions[i].step(*one, lasting, dt) for i, one in enumerate(moving)]
+        events = [run.motions[i].step(*one, lasting, given.dt) for i, one in enumerate(moving)]
         return [event for event in events if event]
 
     def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
@@ -500,7 +484,7 @@ class ForceLoop:
             run.ways |= ways
         return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
 
-    def _output(self, velocity: Array, effort: list[float], frame: str, is_task: bool) -> ForceOutput:
+    def _output(self, velocity: Array, effort: list[float], is_task: bool) -> ForceOutput:
         each, sums = self._run.axes, np.zeros((3, 3))
         for one in each:
             axis, known = one.now, one.known
@@ -514,7 +498,7 @@ class ForceLoop:
             measured,
             error,
             limited,
-            frame,
+            self._run.frame,
             tuple(one.now for one in each),
             tuple(one.known for one in each),
             tuple(map(_row, each)) if is_task else (),
