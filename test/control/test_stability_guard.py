@@ -131,8 +131,8 @@ def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_sta
         loop.tune(replace(OWN, force_gain=(1.02 * allowed,)))
     Loop(guarded(replace(OWN, force_gain=(0.5,)), mode="off"))
     warned = Loop(guarded(replace(OWN, force_gain=(0.5,)), mode="warn"))
-    assert warned.report.is_warning
-    assert warned.report.message.startswith("not stable: force_gain ")
+    assert warned.supervision.report.is_warning
+    assert warned.supervision.report.message.startswith("not stable: force_gain ")
 
 
 @pytest.mark.slow
@@ -142,13 +142,13 @@ def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
         with pytest.raises(ParameterError) as refusal:
             make(replace(own, force_gain=(gain,)))
         reported = str(refusal.value).split("force_gain up to [")[1].split("]")[0]
-        assert make(replace(own, force_gain=(float(reported.split(",")[0]),))).assessment is not None
+        assert make(replace(own, force_gain=(float(reported.split(",")[0]),))).supervision.assessment is not None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str) -> None:
-    found = Loop(replace(PACKAGED, feedback=feedback)).assessment
+    found = Loop(replace(PACKAGED, feedback=feedback)).supervision.assessment
     assert found is not None
     assert found.domain is Domain.I
 
@@ -157,7 +157,7 @@ def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str
 def test_a_bad_set_stops_the_loop_at_its_start() -> None:
     with pytest.raises(ParameterError, match=r"force_gain .* times the largest linearly stable one"):
         Loop(replace(OWN, force_gain=(9.0,)))
-    assert Loop(replace(OWN, mode="open_loop", force_gain=(9.0,))).assessment is None
+    assert Loop(replace(OWN, mode="open_loop", force_gain=(9.0,))).supervision.assessment is None
 
 
 @pytest.mark.slow
@@ -177,7 +177,7 @@ def test_gains_of_joint_torques_are_taken_down_before_the_arm_moves(gain: float,
 @pytest.mark.slow
 def test_a_stiffer_surface_leaves_less_gain_and_a_lag_of_the_feedback_no_more() -> None:
     def scale(own: ForceLoopParameters) -> float:
-        assessment = Loop(guarded(own, mode="warn")).assessment
+        assessment = Loop(guarded(own, mode="warn")).supervision.assessment
         assert assessment is not None
         return assessment.scale
 
@@ -220,8 +220,8 @@ def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_o
     warned, silent = (
         ForceLoop(ARM, STIFF, guarded(replace(OWN, force_gain=(0.09,)), mode=mode), CLOCK) for mode in ("warn", "off")
     )
-    assert warned.report.is_warning
-    assert silent.assessment is None
+    assert warned.supervision.report.is_warning
+    assert silent.supervision.assessment is None
 
 
 # ----------------------------------------------------------------------------------- the testbed
@@ -232,9 +232,9 @@ def test_mode_limit_lowers_the_gains_to_what_a_refusal_allows() -> None:
     allowed = float(str(refusal.value).split("force_gain up to [")[1].split(",")[0])
     lowered = bench_loop(guarded(high, mode="limit"))
     assert lowered.parameters.force_gain == pytest.approx([allowed], rel=0.01)
-    assert "lowered to be stable: force_gain [" in lowered.report.message
-    assert lowered.assessment is not None
-    assert lowered.assessment.domain is Domain.I
+    assert "lowered to be stable: force_gain [" in lowered.supervision.report.message
+    assert lowered.supervision.assessment is not None
+    assert lowered.supervision.assessment.domain is Domain.I
 
 
 def test_mode_limit_lowers_the_posture_gain_where_the_velocity_loop_is_too_slow_for_it() -> None:
@@ -292,7 +292,7 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     assert follow(loop, here) == 1.0
     warned = Loop(guarded(own, mode="warn"))
     follow(warned, STIFF_POSE)
-    assert warned.report.facts["gains multiplied by"] == "1"
+    assert warned.supervision.report.facts["gains multiplied by"] == "1"
 
 
 def test_gains_far_above_their_margin_are_followed_where_the_guard_only_warns() -> None:

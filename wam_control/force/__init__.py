@@ -16,7 +16,6 @@
 ``force_measurement``      the external torques, by the feedback that is chosen; low pass
 ``force_watch``            the six events, each by a condition that lasts
 ``guard``                  admits a parameter set, scales its gains while the arm moves, reports
-``guarded``                what is controlled, as the guard sees it
 ``held_arm``               an arm that is pushed
 ``knowledge``              what is known of each force of a command in a period
 ``limits``                 what bounds the motion

@@ -26,7 +26,6 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import Seen
 from wam_control.force.guard import Supervision
-from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
 from wam_control.force.knowledge import Knowledge
 from wam_control.force.limits import (
@@ -290,11 +289,11 @@ class ForceLoop:
 
     def _move(self, found: Sequence[Event], given: ForceInput) -> tuple[Array, list[float], list[Event]]:
         """Joint velocities and torques (n,), and what limits them."""
-        own, run, sensing, supervision = self.parameters, self._run, self._axes.forces, self.supervision
+        own, run, sensing = self.parameters, self._run, self._axes.forces
         axes, contact, dt = [one.now for one in run.axes], given.contact or NO_CONTACT, given.dt
         holds = any(event.holds for event in found)
         if axes:
-            supervision.step(lambda: guarded(self._q, axes, contact, sensing, own, supervision), dt)
+            self.supervision.step(self._q, axes, contact, dt)
         may_watch = bool(axes) and own.is_estimated and not run.is_touching
         is_watching = may_watch and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
         torque_sd = self._measurement.torques.sd

@@ -11,20 +11,27 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import tolerance
+from wam_control.force.contact_place import ContactPlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of, torque_law
+from wam_control.force.problem import linear
 from wam_control.force.stability_guard import (
     GuardAssessment,
     Guarded,
     GuardedContact,
+    GuardedForces,
     GuardedTask,
     StabilityGuard,
     listed,
     posture_of,
+    triple,
 )
-from wam_control.force.thresholds import GUARD
+from wam_control.force.task import AxisKind, TaskAxis
+from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
+from wam_description.signals import Contact
 from wam_description.transmission_map import TransmissionMap
 
 UNKNOWN: Final = "at `worst case`, until a force is commanded"
@@ -139,10 +146,57 @@ class Supervision:
         }
         return Report(message, bool(assessment.reason) or factor < 1.0, facts)
 
-    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> None:
-        """Go on with the assessment; arguments as those of `Watch.step`."""
-        if self.watch is not None and self.watch.step(where, dt):
+    def step(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact, dt: float) -> None:
+        """Go on with the assessment.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        axes : that are commanded.
+        contact : estimated.
+        dt : outer period, s.
+        """
+        if self.watch is not None and self.watch.step(lambda: self._guarded(q, axes, contact), dt):
             self.report = self._report()
+
+    def _guarded(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
+        """Where the axes press: at all contacts at once; nothing where nothing presses.
+
+        What is controlled there is the linear part of the problem of a period.  Torques of joints press wherever
+        something is: each of its contacts is considered by itself.
+        """
+        own, contacts = self.parameters, []
+        for axis in axes:
+            if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < np.inf:
+                direction = triple(axis.direction)
+                contacts.append(GuardedContact(tuple(q), *axis.place[:3], direction, axis.desired or FORCE.hand))
+        if contacts:
+            together = [tuple(contacts)]
+        elif any(axis.is_joint and axis.is_force for axis in axes):
+            anywhere = TaskAxis(AxisKind.FORCE, position=None)
+            places = ContactPlace(self.guard.arm.covers).step(anywhere, contact, 0.0, own)
+            alone = (self.guard.contacts(q, *place[:3], [FORCE.sized_force]) for place in places)
+            together = [(one,) for each in alone for one in each]
+        else:
+            return []
+        n = len(q)
+        move, left = linear([axis.along for axis in axes], n)
+        hold, sense, gain = own.posture_gain * left, np.zeros((len(axes), n)), np.zeros((2, len(axes)))
+        for i, axis in enumerate(axes):
+            if axis.of.is_sensed:
+                sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
+            if axis.is_force:
+                move[:, i] *= 1.0 if axis.sensed is None else axis.sensed.speed_fraction
+                law = self.torque_law if axis.is_joint else self.force_law.along(axis.in_frame.tolist())
+                at = max(axis.of.joint, 0)
+                gain[:, i] = law.gain[at], law.proportional_gain[at]
+            elif axis.of.kind is not AxisKind.VELOCITY:
+                rate = own.task.largest_rate
+                if axis.of.kind is AxisKind.IMPEDANCE:
+                    damping = own.task.damping(axis.of)
+                    rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
+                hold = hold + rate * np.outer(move[:, i], axis.along)
+        return [GuardedForces(each, sense, move, gain[0], gain[1], hold) for each in together]
 
     @property
     def factor(self) -> float:
