@@ -36,7 +36,7 @@ class AxisRun:
         probable first.
     known : what is known of its force.
     place : where its force acts.
-    watch : what is reported of its force.
+    watch, touch : what is reported of its force, and whether it presses.
     anchor : position to hold where none is commanded, m or rad.
     wound_up : force, N, to which the velocity loops have wound up before its torque is fed forward; infinite while they
         do, NaN until the touch.
@@ -50,6 +50,7 @@ class AxisRun:
         self.known = UNKNOWN
         self.place = ContactPlace(covers)
         self.watch = ForceWatch(is_dithered)
+        self.touch = self.watch.touch
         self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
         self.rising = self._shown = 0.0
         self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
@@ -65,7 +66,7 @@ class AxisRun:
         The law would press too hard, if it compared a measured force that is late with a commanded one that is not.
         """
         desired = self.now.desired
-        if not (own.limits.impact and self.watch.touch.is_there):
+        if not (own.limits.impact and self.touch.is_there):
             self.rising = self._shown = self.known.force if own.limits.impact else desired
             return desired
         most = max(desired, self.rising) * dt / max(FORCE.ramp * own.latency, dt)
@@ -204,7 +205,7 @@ class CommandRun:
     @property
     def is_touching(self) -> bool:
         """Whether something is touched by one of its forces."""
-        return any(one.watch.touch.is_there for one in self.axes)
+        return any(one.touch.is_there for one in self.axes)
 
     def judge(self, q: Angles, measurement: ForceMeasurement, forces: ForceAxes, limit: float) -> None:
         """Decide once, for the first axis, whether the torques at rest are those of a touched surface.
@@ -231,11 +232,11 @@ class CommandRun:
         is_approach = all(one.now.is_force for one in self.axes)
         for one in self.axes:
             axis = one.now
-            if not axis.is_force or axis.place is None or not (is_approach or one.watch.touch.is_there):
+            if not axis.is_force or axis.place is None or not (is_approach or one.touch.is_there):
                 continue
             one.place.slide(forces.slide(q, axis.place.cover, axis.place.position, moved))
             square = float(axis.along.dot(axis.along))
-            if not one.watch.touch.is_there and square:
+            if not one.touch.is_there and square:
                 self.approached = self.approached + axis.along * (float(axis.along.dot(moved)) / square)
 
     def fed_forward(self, holds: bool, own: ForceLoopParameters) -> Array:

@@ -45,7 +45,6 @@ from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, warning
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, Triple
-from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceInput", "ForceLoop", "ForceLoopParameters", "ForceOutput", "by_seriousness"]
 
@@ -92,7 +91,7 @@ class ForceLoop:
     def __init__(
         self, arm: Arm, servo: Servo, parameters: ForceLoopParameters, timing: Timing, command_age: float = math.inf
     ) -> None:
-        self._timing, self._servo, self._body, self._map = timing, servo, RigidBody(arm), TransmissionMap.of(arm)
+        self._timing, self._servo, self._body = timing, servo, RigidBody(arm)
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._measurement = ForceMeasurement(self._body)
         self._pushed = PushedArm(self._body)
@@ -272,7 +271,7 @@ class ForceLoop:
             if not (axis.is_force and axis.desired):
                 continue
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
-            one.watch.touch.step(force, size, given.dt)
+            one.touch.step(force, size, given.dt)
             way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(moved))
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
             seen = Seen(known, way, touched if is_touched else "", is_led)
@@ -321,8 +320,8 @@ class ForceLoop:
         limits = [] if velocity is free else self._at_ends(free, velocity)
         fed = run.fed_forward(holds, own)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
-            countered = _dry_friction(self._body.arm, self._map, velocity.tolist())
-            fed += own.friction_feedforward * run.friction.step(np.array(countered), FORCE.friction_time, dt)
+            countered = sensing.dry_friction(velocity.tolist())
+            fed += own.friction_feedforward * run.friction.step(countered, FORCE.friction_time, dt)
         return velocity, fed.tolist(), limits
 
     def _towards(self, goal: Array, rate: Sequence[float] | None = None) -> Array:
@@ -383,14 +382,14 @@ class ForceLoop:
         law, expected = self.supervision.force_law.along(axis.in_frame.tolist()), one.expected(own, dt)
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
-            one.is_kept = one.watch.touch.is_there and abs(axis.desired - known.force) < band
+            one.is_kept = one.touch.is_there and abs(axis.desired - known.force) < band
             if one.is_kept:
                 return 0.0
         error = expected - known.force
         speed = factor * one.watch.oscillation.share * law.velocity(0, error, expected - known.before, dt)
         if axis.desired:  # back no faster than the measured force can follow
             slack = servo_yielding(axis, self.supervision.servo_stiffness, own)
-            most = approach_speed(axis, one.watch.touch.is_there, own, slack)
+            most = approach_speed(axis, one.touch.is_there, own, slack)
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
 
@@ -401,7 +400,7 @@ class ForceLoop:
             return np.zeros_like(wanted)
         for one in run.axes:
             axis = one.now
-            if axis.is_force and axis.desired and axis.place and one.watch.touch.has_been and own.limits.impact:
+            if axis.is_force and axis.desired and axis.place and one.touch.has_been and own.limits.impact:
                 left = unlimited([row._replace(speed=0.0) for row in rows], wanted)
                 wanted = followed(left, axis, self._body, self._pose, own)
         return wanted
@@ -412,9 +411,9 @@ class ForceLoop:
         """What pushes harder than allowed."""
         own, run, torques = self.parameters, self._run, self._measurement.torques
         # whatever is touched is loaded by the arm's own motion, also where that is not along the commanded force
-        has_touched = contact.cover or any(one.watch.touch.has_been for one in run.axes)
+        has_touched = contact.cover or any(one.touch.has_been for one in run.axes)
         pressed = math.fsum(axis.desired for axis in forces) if has_touched else 0.0
-        is_bouncing = any(one.watch.touch.is_bouncing for one in run.axes)
+        is_bouncing = any(one.touch.is_bouncing for one in run.axes)
         bounds = [(own.limits.contact_force, "limits.contact_force")]
         if holds:
             bounds.append((allowed, "the commanded force"))
@@ -535,15 +534,3 @@ def _row(one: AxisRun) -> AxisRow:
     measured = sign * known.force if axis.of.is_sensed else axis.at
     fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction
     return float(axis.of.kind), commanded, measured, known.sd if axis.of.is_sensed else math.nan, fraction
-
-
-def _dry_friction(arm: Arm, transmission: TransmissionMap, velocity: Sequence[float]) -> list[float]:
-    """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
-
-    Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
-    up through twice the friction, which takes them seconds.
-    """
-    turning = zip(arm.motors.dynamic_friction, transmission.motor_velocities(velocity), strict=True)
-    turned = transmission.joint_torques([friction * math.tanh(speed / FORCE.slow_motor) for friction, speed in turning])
-    moved = zip(arm.joints.dynamic_friction, velocity, turned, strict=True)
-    return [torque + friction * math.tanh(speed / FORCE.slow_joint) for friction, speed, torque in moved]

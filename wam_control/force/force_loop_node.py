@@ -29,7 +29,6 @@ class ForceLoopNode:
         self.tune = self._loop.tune
         self._shared = shared
         self._player = TrajectoryPlayer(shared.arm, shared.motion)
-        self._is_on_trajectory = False
         self._command: Table | None = None
         self._known: TaskCommand | None = None
         self._refusal = ""
@@ -64,7 +63,7 @@ class ForceLoopNode:
             inputs["force_command"], inputs["joint_posture_command"], inputs["joint_torque_command"]
         )  # fmt: skip
         task, joints = self._task(inputs["task_command"]), inputs["joint_states"]
-        if inputs["joint_trajectory"] is not None or self._is_on_trajectory:
+        if inputs["joint_trajectory"] is not None or self._player.trajectory is not None:
             posture = self._on_trajectory(inputs)
         if self._refusal:
             command = posture = torque = None  # the arm holds its position
@@ -98,7 +97,6 @@ class ForceLoopNode:
     def _on_trajectory(self, inputs: Inputs) -> State | None:
         """The posture on a trajectory, None where the arm is to stay where it is."""
         trajectory, joints = inputs["joint_trajectory"], inputs["joint_states"]
-        self._is_on_trajectory = trajectory is not None
         moving = self._player.step(trajectory, joints.position, joints.velocity, inputs.dt)
         return State(moving.position, moving.velocity, []) if moving else None
 

@@ -49,6 +49,7 @@ class TrajectoryPlayer:
 
     Attributes
     ----------
+    trajectory : that was streamed in the last period, None for none.
     refusal : why the present trajectory is not played, '' where it is.
     motion : the present trajectory; None until the arm is at rest and it has begun.
     time : s, since it began.
@@ -56,7 +57,7 @@ class TrajectoryPlayer:
 
     def __init__(self, arm: Arm, limits: MotionParameters) -> None:
         self._arm, self._limits = arm, limits
-        self._present: PosturePath | None = None
+        self.trajectory: PosturePath | None = None
         self.motion: PostureMotion | None = None
         self.time, self.refusal = 0.0, ""
 
@@ -69,8 +70,8 @@ class TrajectoryPlayer:
         q, qd : joint angles and velocities (n,), rad and rad/s.
         dt : outer period, s.
         """
-        if trajectory != self._present:
-            self._present, self.motion, self.time, self.refusal = trajectory, None, 0.0, ""
+        if trajectory != self.trajectory:
+            self.trajectory, self.motion, self.time, self.refusal = trajectory, None, 0.0, ""
         if trajectory is None or self.refusal:
             return None
         if self.motion is None:
