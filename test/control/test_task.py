@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -289,15 +288,11 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
 def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, GuardedTask, GuardedForces]:
     """What the guard considers of a task."""
     guard = StabilityGuard(WAM, SHARED.servo, SHARED.timing, GIVEN.guard, GIVEN.sensing_fed_back)
-    seen: list[GuardedForces] = []
-
-    def factor(where: Callable[[], list[GuardedForces]], dt: float) -> tuple[float, bool]:
-        seen.extend(where())
-        return 1.0
-
-    world.loop._supervision.factor = factor  # type: ignore[assignment, method-assign]
     world.step(task)
-    return guard, task_of_parameters(GIVEN), seen[0]
+    axes = [one.now for one in world.loop._run.axes]
+    (forces,) = world.loop.supervision._guarded(world.loop._q, axes, NO_CONTACT)
+    assert isinstance(forces, GuardedForces)
+    return guard, task_of_parameters(GIVEN), forces
 
 
 def test_the_guard_considers_one_force_of_a_task_as_a_force_alone() -> None:

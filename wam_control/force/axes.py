@@ -84,14 +84,13 @@ class TaskAxes:
         q : joint angles (n,), rad.
         task : what is commanded.
         places : where each axis acts.
-        sides : 1 or -1, where along its direction each impedance touches; those of forces follow from their sign.
+        sides : 1 or -1, where along its direction each impedance touches; 1 for others.
         """
         rotation = self.rotation(q, task.frame)
-        signs = [
-            (-1.0 if (axis.value or 0.0) < 0.0 else 1.0) if axis.kind is AxisKind.FORCE else side
+        in_frame = [
+            (-side if axis.kind is AxisKind.FORCE and (axis.value or 0.0) < 0.0 else side) * np.array(axis.direction)
             for axis, side in zip(task.axes, sides, strict=True)
         ]
-        in_frame = [sign * np.array(axis.direction) for axis, sign in zip(task.axes, signs, strict=True)]
         directions = [rotation.dot(along) for along in in_frame]
         each = zip(task.axes, places, directions, strict=True)
         torques = [[] if len(places) == 1 else self._disturbance(q, *one) for one in each]

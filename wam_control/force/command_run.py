@@ -252,7 +252,7 @@ class CommandRun:
         fed = np.zeros(len(self.approached))
         for one in self.axes:
             axis = one.now
-            if axis.is_force and not holds:
+            if not holds:
                 fed += own.force_feedforward * axis.desired * axis.along
             if self.is_touching and axis.is_force and axis.place is not None:
                 if holds or not axis.place.is_known:

@@ -44,7 +44,7 @@ from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, warning
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, Triple
+from wam_description.signals import BASE, NO_CONTACT, ZERO, Contact, ForceCommand, Triple
 
 __all__ = ["ForceCommand", "ForceInput", "ForceLoop", "ForceLoopParameters", "ForceOutput", "by_seriousness"]
 
@@ -60,9 +60,9 @@ class ForceOutput(NamedTuple):
 
     velocity: list[float]  # (n,) rad/s, empty for torque only
     effort: list[float]  # (n,) N m
-    measured: Triple = (0.0, 0.0, 0.0)  # N
-    error: Triple = (0.0, 0.0, 0.0)  # N
-    limited: Triple = (0.0, 0.0, 0.0)  # N
+    measured: Triple = ZERO  # N
+    error: Triple = ZERO  # N
+    limited: Triple = ZERO  # N
     frame: str = BASE
     axes: tuple[CommandedAxis, ...] = ()
     known: tuple[Belief, ...] = ()  # of each axis
@@ -101,7 +101,7 @@ class ForceLoop:
         self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self.tune(parameters)
-        zero = np.zeros(len(self._velocity))
+        zero = self._velocity
         self._run = CommandRun((), None, arm, timing, zero, zero, zero, False)
 
     def tune(self, parameters: ForceLoopParameters) -> None:
@@ -231,12 +231,12 @@ class ForceLoop:
         if task is None:
             return
         places = [self._places(task, axis, contact, one.place) for axis, one in zip(task.axes, run.axes, strict=True)]
-        knowledge, sides = self._knowledge, [one.side for one in run.axes]
+        sides = [one.side for one in run.axes]
         links = max(map(len, places))
         each = zip(*(at * (links // len(at)) for at in places), strict=True)
         axes = zip(*(self._axes.of(self._pose, task, at, sides) for at in each), strict=True)
         for one, axis, at in zip(run.axes, axes, places, strict=True):
-            one.on_links = knowledge.among(self._pose, axis[: len(at)], contact)
+            one.on_links = self._knowledge.among(self._pose, axis[: len(at)], contact)
 
     def _places(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> list[ForcePlace]:
         lean = 0.0
@@ -255,20 +255,17 @@ class ForceLoop:
         moved = q - run.before
         run.before = q
         run.judge(q, self._measurement, forces, own.sensing.zero_limit)
-        knowledge = self._knowledge
         for one in run.axes:
-            one.known = knowledge.of(q, one.on_links)
+            one.known = self._knowledge.of(q, one.on_links)
         run.move(moved, forces, q)
-        found: list[Event] = []
-        if run.is_moving:
-            found.append(holding(Code.REFUSED, "moved_fast", speed=FORCE.fast))
+        found = [holding(Code.REFUSED, "moved_fast", speed=FORCE.fast)] if run.is_moving else []
         is_led = bool(given.rate) or not all(one.now.is_force for one in run.axes)
         covers = {one.of.cover for one in run.axes if one.now.place}
         probable = contact.probability >= own.link_probability_limit
         touched = contact.cover if covers and probable and not covers & {"", contact.cover} else ""
         for one in run.axes:
             axis, known = one.now, one.known
-            if not (axis.is_force and axis.desired):
+            if not axis.desired:
                 continue
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
             one.touch.step(force, size, given.dt)
@@ -300,14 +297,14 @@ class ForceLoop:
             run.still_sd = torque_sd
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
-        rows: list[VelocityRow] = []
+        rows = [] if holds or not axes else self._rows(is_watching, dt)
         if holds:
-            run.held_at = self._hold_at(found, contact) if run.held_at is None else run.held_at
+            if run.held_at is None:
+                run.held_at = self._hold_at(found, contact)
             # what it may hit on its way back after a push
             wanted = calm(self._towards(run.held_at), sensing.moved_inertia(self._pose), own.impact_energy(allowed))
         else:
             run.held_at = None
-            rows = self._rows(is_watching, dt) if axes else []
             wanted = self._towards(np.array(self._admission.posture) + run.approached, given.rate)
             if not given.rate:
                 wanted = self._slowed(rows, wanted)
@@ -400,7 +397,7 @@ class ForceLoop:
             return np.zeros_like(wanted)
         for one in run.axes:
             axis = one.now
-            if axis.is_force and axis.desired and axis.place and one.touch.has_been and own.limits.impact:
+            if axis.desired and axis.place and one.touch.has_been and own.limits.impact:
                 left = unlimited([row._replace(speed=0.0) for row in rows], wanted)
                 wanted = followed(left, axis, self._body, self._pose, own)
         return wanted

@@ -274,10 +274,8 @@ class ForceWatch:
             self._travel = 0.0 if seen.is_led else min(self._travel, 0.0)
         if abs(self._travel) <= own.limits.free_travel:
             return None
-        settled = float(self._has_settled)
-        return holding(
-            Code.AT_LIMIT, "free_travel", way=self._travel, allowed=own.limits.free_travel, has_settled=settled
-        )
+        values = {"way": self._travel, "allowed": own.limits.free_travel, "has_settled": float(self._has_settled)}
+        return holding(Code.AT_LIMIT, "free_travel", **values)
 
     def _unexplained(
         self, axis: CommandedAxis, known: Belief, torques: Array, own: ForceLoopParameters, dt: float
