@@ -216,8 +216,7 @@ class CommandRun:
         if self._is_decided or axis is None or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
             return
         self._is_decided, torques = True, self.resting
-        mass, left = measurement.payload(q, torques, float(measurement.torques.sd.max()))
-        if mass > 0.0 and left <= FORCE.unexplained:
+        if measurement.payload(torques, float(measurement.torques.sd.max())):
             return
         force = axis.force(torques)
         if axis.sensed is not None and axis.place is not None and float(np.abs(torques).max()) <= limit:

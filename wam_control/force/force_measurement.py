@@ -123,9 +123,8 @@ class ForceMeasurement:
 
     def _taken(self, torques: Array) -> Zero:
         """Torques (n,), N m, as zero: of a payload where they are certainly some, and one explains them."""
-        mass, left = self.payload(self._q, torques, float(self._torque_sd.max()))
-        scaled = torques / self._torque_sd
-        if mass > 0.0 and left <= FORCE.unexplained < float(scaled @ scaled):
+        mass, scaled = self.payload(torques, float(self._torque_sd.max())), torques / self._torque_sd
+        if mass and float(scaled @ scaled) > FORCE.unexplained:
             return Zero(mass, torques - mass * _weight(self._body, self._q))
         return Zero(0.0, torques)
 
@@ -148,16 +147,15 @@ class ForceMeasurement:
             self.free = self._zeros
             self.restart()
 
-    def payload(self, q: Angles, torques: Array, torque_sd: float) -> tuple[float, float]:
-        """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
+    def payload(self, torques: Array, torque_sd: float) -> float:
+        """Mass at the tool, kg, that explains torques of the world on the joints; 0 where none does.
 
         Parameters
         ----------
-        q : joint angles (n,), rad.
         torques, torque_sd : torques (n,), N m, and the standard deviation of each, N m.
         """
         sd = math.hypot(torque_sd, FORCE.payload_rest * float(np.abs(torques).max()))
-        weight, scaled = _weight(self._body, q) / sd, torques / sd
+        weight, scaled = _weight(self._body, self._q) / sd, torques / sd
         mass = float(weight @ scaled) / max(float(weight @ weight), FORCE.negligible)
         left = scaled - mass * weight
-        return mass, float(left @ left)
+        return mass if mass > 0.0 and float(left @ left) <= FORCE.unexplained else 0.0

@@ -6,6 +6,7 @@ of parameters can diverge, whatever the friction (domain I).  Above it, friction
 the loop for small errors (domain II); the guard does not rely on that.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from wam_control.force.force_axis import ForceAxes, ForceAxis, ForcePlace, SensingParameters
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
-from wam_control.force.thresholds import FORCE, GUARD
+from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter
 from wam_description.signals import Triple
@@ -213,8 +214,7 @@ class StabilityGuard:
 
     def with_lever(self, contact: GuardedContact) -> list[GuardedContact]:
         """The contact itself; nothing where its force has no lever on any joint."""
-        lever = self.axis(contact).lever
-        return [contact] if float(lever @ lever) > FORCE.least_lever * FORCE.least_lever else []
+        return [contact] if self.axis(contact).force_sd < math.inf else []
 
     def axis(self, contact: GuardedContact) -> ForceAxis:
         """How the force loop senses the force of a contact, and moves along it."""
@@ -233,12 +233,17 @@ class StabilityGuard:
         contacts : contacts to consider.
         tried : scales to try, in rising order; the last one is returned where all are stable.
         """
+        is_spring = task.feedback.kind == "joint_position"  # of its own stiffness alone
+        parts = DESIGN.softer[:1] if is_spring else DESIGN.softer
+        # a lag can also stabilise a loop, which is not relied on
+        lags = sorted({0.0, task.feedback.lag if task.feedback.kind == ESTIMATE else 0.0})
         for each in contacts:
-            alone = [self._stiffness(contact) for contact in each.contacts]
+            levers = [self.axis(contact).lever for contact in each.contacts]
+            alone = [self.parameters.contact_stiffness * np.outer(lever, lever) for lever in levers]
             together = [np.sum(alone, axis=0), *alone] if len(alone) > 1 else alone
-            for late, feedback in product(self._delays(task), _lags(task.feedback)):
-                axes = self._axes(task, each, late)
-                for part, stiffness in product(self._parts(task), together):
+            for late, lag in product(self._delays(task), lags):
+                axes, feedback = self._axes(task, each, late), task.feedback._replace(lag=lag)
+                for part, stiffness in product(parts, together):
                     yield self._loop.margin(each.q, axes, part * stiffness, feedback, tried)
 
     @lru_cache(maxsize=64)  # noqa: B019 - what a process has assessed lately is not computed again
@@ -337,10 +342,6 @@ class StabilityGuard:
         mean = self.timing.dither_cycle // 2 if task.feedback.kind == ESTIMATE else 0
         return sorted({0, extra, extra + mean})
 
-    def _parts(self, task: GuardedTask) -> tuple[float, ...]:
-        """Fractions of the stiffness to consider; a known spring has its own alone."""
-        return DESIGN.softer[:1] if task.feedback.kind == "joint_position" else DESIGN.softer
-
     def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
         timing = self.timing
         n = len(self.arm.joints.names)
@@ -352,15 +353,6 @@ class StabilityGuard:
         hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / float(lever @ lever))
         gains = np.array([max(law.gain)]), np.array([max(law.proportional_gain)])
         return Axes(axis.sense[None], axis.move[:, None], *gains, hold, task.filter_time, delay)
-
-    def _stiffness(self, contact: GuardedContact) -> Array:
-        lever = self.axis(contact).lever
-        return self.parameters.contact_stiffness * np.outer(lever, lever)
-
-
-def _lags(feedback: Feedback) -> list[Feedback]:
-    """The feedback with and without its lag: a lag can also stabilise a loop, which is not relied on."""
-    return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
 
 
 def posture_of(contact: GuardedContact) -> str:
