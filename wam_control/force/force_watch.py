@@ -173,7 +173,8 @@ class ForceWatch:
         self.touch, self.oscillation = TouchWatch(), Oscillation()
         self.ended: Event | None = None
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
-        self._is_refused, self._is_decided, self._has_settled = True, False, False
+        # of the largest doubt: 1 while it is refused, then somewhat more, and any once it is decided
+        self._slack, self._has_settled = 1.0, False
         self._desired, self._travel = math.nan, 0.0
         self._pattern: Array | None = None  # m, torques per force that it did not explain as it settled
 
@@ -195,7 +196,7 @@ class ForceWatch:
             self._changed = Lasting()
             self.oscillation.rest()
         events = self._decide(axis, known, error, own, dt)
-        if self._is_refused:
+        if self._slack == 1.0:
             return events
         is_reached = self.touch.is_there and abs(error) <= known.tolerance
         self.ended = self.ended or self._contradicted(axis, seen, dt) or self._travelled(seen, is_reached, own)
@@ -232,13 +233,12 @@ class ForceWatch:
         self, axis: CommandedAxis, known: Belief, error: float, own: ForceLoopParameters, dt: float
     ) -> list[Event]:
         """Refused until the force is there, at a pinned position until the touch; then reported, where it lasts."""
-        most, place = own.limits.doubt, axis.place
-        if self._is_refused or not self._is_decided:
-            self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
-        is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
-        self._is_decided = self._is_decided or (is_there and not self._is_refused)
-        if self._is_refused:
+        place = axis.place
+        if known.doubt > self._slack * own.limits.doubt:
+            self._slack = 1.0
             return [holding(Code.REFUSED, "error", **self._wrong(known.errors.size, axis, known, own))]
+        is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
+        self._slack = max(self._slack, math.inf if is_there else FORCE.hysteresis)
         # what is off already leaves less of the tolerance to what is not known; what is off by all of it is not reached
         off = error if abs(error) <= known.tolerance else 0.0
         error = math.hypot(known.errors.size, off)
