@@ -20,8 +20,7 @@ class InferenceParameters:
         "relative frequency of contacts at the ends of two links where they meet, for each of the two links", high=1e3
     )
     along_weight: float = parameter(
-        "relative frequency of forces along the last link on its surface; the same on its end",
-        high=1e3,
+        "relative frequency of forces along the last link, for each of surface and end", high=1e3
     )
     payload_weight: float = parameter(
         "relative frequency of a mass that is picked up at the tool",
