@@ -109,7 +109,7 @@ REQUIREMENTS: Final = {
         "set the command to zero at enable, and `since` when the brakes change",
     ),
     "peers": Requirement(
-        "brakes at a fault in the status of another node, and refuses enable until that fault ends",
+        "faults if the status of another node has a fault; refuses enable until that ends",
         "read the status of all nodes; brake at level ERROR with a fault, and name both in an event",
     ),
     "claims": Requirement(
@@ -117,7 +117,7 @@ REQUIREMENTS: Final = {
         "count the publishers of the topic in every status period",
     ),
     "agreement": Requirement(
-        "brakes and refuses enable while the `shared parameters` of two nodes differ",
+        "faults and refuses enable while the `shared parameters` of two nodes differ",
         "compare the texts of all nodes with your own; if they differ, two configurations are in use",
     ),
     "end": Requirement(
