@@ -64,7 +64,7 @@ class Panel(NamedTuple):
 
     Attributes
     ----------
-    title, x, y : texts.
+    title, x, y : texts; a y axis without one has no numbers.
     lines : label and numbers of each line.
     logarithmic : of '', 'x', 'y', 'xy'.
     marks : what is named in it.

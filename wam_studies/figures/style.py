@@ -68,6 +68,7 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
     for mark in panel.marks:
         _name(axes, mark)
     axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
+    axes.yaxis.set_visible(bool(panel.y))
     axes.set_xscale("log" if "x" in panel.logarithmic else "linear")
     axes.set_yscale("log" if "y" in panel.logarithmic else "linear")
     low_x, high_x, low_y, high_y = (None if math.isnan(limit) else limit for limit in panel.limits)
