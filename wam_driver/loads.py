@@ -21,16 +21,6 @@ from wam_description.world import Springs
 from wam_driver.thresholds import PLANT
 
 
-class SpringOnCover(NamedTuple):
-    """A spring with a lever on the link of a cover."""
-
-    tendon: int
-    cover: str
-    lever: float  # m
-    rest: float  # length of the tendon at which the spring is not pressed, m
-    bilateral: bool
-
-
 class PartialLoad(NamedTuple):
     """One of the forces that make a load, in the cover's frame."""
 
@@ -42,6 +32,7 @@ class PartialLoad(NamedTuple):
 class CoverFrame(NamedTuple):
     """Where a cover is; views into MuJoCo's memory: to fetch them in each step costs more than a push."""
 
+    site: int
     rotation: np.ndarray  # (3, 3)
     origin: np.ndarray  # (3,) m, in the base frame
     body: int
@@ -74,17 +65,17 @@ class CoverLoads:
 
     def __init__(self, model: Any, data: Any, arm: Arm, springs: Springs) -> None:
         self._model, self._data = model, data
-        covers = arm.covers
-        self._site = {name: model.site(f"{name}_frame").id for name in covers.names}
-        self._frame = {
-            name: CoverFrame(data.site_xmat[site].reshape(3, 3), data.site_xpos[site], model.body(link).id)
-            for (name, site), link in zip(self._site.items(), covers.links, strict=True)
-        }
+        self._frame: dict[str, CoverFrame] = {}
+        for name, link in zip(arm.covers.names, arm.covers.links, strict=True):
+            site = model.site(f"{name}_frame").id
+            rotation, origin = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
+            self._frame[name] = CoverFrame(site, rotation, origin, model.body(link).id)
         self._applied = data.qfrc_applied
-        present = {model.geom(i).name for i in range(model.ngeom)}
-        geoms = {geom: name for name in covers.names for geom in (name, folded(name)) if geom in present}
-        self._cover_of_geom = {model.geom(geom).id: name for geom, name in geoms.items()}
-        self._springs = list(_springs_on_covers(model, arm, springs))
+        owners = {geom: name for name in arm.covers.names for geom in (name, folded(name))}
+        geoms = {i: model.geom(i).name for i in range(model.ngeom)}
+        self._cover_of_geom = {i: owners[geom] for i, geom in geoms.items() if geom in owners}
+        tendons = enumerate(springs.present, 2 * len(arm.motors.names))  # after the strands of the cables
+        self._springs = [(tendon, sprung_cover(arm, spring.joint), spring) for tendon, spring in tendons]
         self.pushes: dict[str, AppliedPush] = {}
         turned = np.zeros(6)
         self._turned = turned[:3], turned[3:]  # force and torque of a push in the base frame
@@ -103,8 +94,8 @@ class CoverLoads:
             position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
             load = PartialLoad(pushed, turned, position)
             size, unit = (force, "N") if any(force) else (torque, "N m")
-            words = f"{math.hypot(*size):.4g} {unit} on {cover}"
-            self.pushes[cover] = AppliedPush(self._site[cover], self._frame[cover].body, *at_frame, load, words)
+            frame, words = self._frame[cover], f"{math.hypot(*size):.4g} {unit} on {cover}"
+            self.pushes[cover] = AppliedPush(frame.site, frame.body, *at_frame, load, words)
         else:
             self.pushes.pop(cover, None)
 
@@ -138,8 +129,7 @@ class CoverLoads:
         parts: dict[str, list[PartialLoad]] = {name: [] for name in self._frame}
         for cover, part in chain(self._contacts(), self._pushed(), self._sprung()):
             parts[cover].append(part)
-        loads = (_sum(cover, on_cover) for cover, on_cover in parts.items())
-        return [load for load in loads if load is not None]
+        return list(filter(None, map(_sum, parts, parts.values())))
 
     def sunk(self) -> str:
         """Which cover is too deep in what it touches for a contact force, and what to do; '' where none is.
@@ -148,43 +138,34 @@ class CoverLoads:
         jumps to one along the tube, and deeper in there is none.  What touches the side of a tube pushes across it.
         Beyond the middle of an object the nearest face is the one behind it, and the force changes its sign.
         """
-        data, sizes = self._data, self._model.geom_size
-        for i in range(data.ncon):
-            pair = data.contact.geom[i].tolist()
-            for geom, other, sign in zip(pair, reversed(pair), (1.0, -1.0), strict=True):
-                depth, (radius, half, _) = -float(data.contact.dist[i]), sizes[geom].tolist()
-                if geom not in self._cover_of_geom or depth <= radius:
-                    continue
-                deepest = radius + PLANT.middle * half_lengths(self._model, other).min()
-                is_solid = self._model.geom_type[other] != mujoco.mjtGeom.mjGEOM_PLANE
-                if is_solid and depth > deepest:
-                    return (
-                        f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in {self._model.geom(other).name}; "
-                        f"allowed: {deepest * 1e3:.3g} mm, as beyond its middle the contact force would push to the "
-                        "other side; press less, or on a stiffer surface"
-                    )
-                normal, axis = data.contact.frame[i][:3], data.geom_xmat[geom].reshape(3, 3)[:, 2]
-                nearest = data.contact.pos[i] - sign * (radius - 0.5 * depth) * normal  # point of the axis
-                if (
-                    abs(normal @ axis) > PLANT.least_normal
-                    and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half
-                ):
-                    return (
-                        f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in an edge, where the direction of "
-                        f"the contact force is unknown; allowed: {radius * 1e3:.3g} mm, the radius of the tube; "
-                        "press less, or on a stiffer surface"
-                    )
+        data, model = self._data, self._model
+        for i, geom, other, sign in sides(data):
+            depth, (radius, half, _) = -float(data.contact.dist[i]), model.geom_size[geom].tolist()
+            if geom not in self._cover_of_geom or depth <= radius:
+                continue
+            found = f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in"
+            deepest = radius + PLANT.middle * model.geom_aabb[other, 3:].min()  # half sizes, huge for a plane
+            if depth > deepest:
+                return (
+                    f"{found} {model.geom(other).name}; allowed: {deepest * 1e3:.3g} mm, as beyond its middle the "
+                    "contact force would push to the other side; press less, or on a stiffer surface"
+                )
+            normal, axis = data.contact.frame[i][:3], data.geom_xmat[geom].reshape(3, 3)[:, 2]
+            nearest = data.contact.pos[i] + sign * (radius - 0.5 * depth) * normal  # point of the axis
+            if abs(normal @ axis) > PLANT.least_normal and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half:
+                return (
+                    f"{found} an edge, where the direction of the contact force is unknown; allowed: "
+                    f"{radius * 1e3:.3g} mm, the radius of the tube; press less, or on a stiffer surface"
+                )
         return ""
 
     def _contacts(self) -> Iterator[tuple[str, PartialLoad]]:
         data = self._data
-        for i in range(data.ncon):
-            first, second = data.contact.geom[i].tolist()
-            for geom, sign in ((second, 1.0), (first, -1.0)):  # none between objects, both between links
-                if geom in self._cover_of_geom:
-                    cover = self._cover_of_geom[geom]
-                    force = self._frame[cover].rotation.T.dot(sign * contact_force(self._model, data, i))
-                    yield self._part(cover, force, data.contact.pos[i])
+        for i, geom, _, sign in sides(data):
+            if geom in self._cover_of_geom:
+                cover = self._cover_of_geom[geom]
+                force = self._frame[cover].rotation.T.dot(sign * contact_force(self._model, data, i))
+                yield self._part(cover, force, data.contact.pos[i])
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
         for cover, push in self.pushes.items():
@@ -192,17 +173,17 @@ class CoverLoads:
 
     def _sprung(self) -> Iterator[tuple[str, PartialLoad]]:
         data = self._data
-        for tendon, cover, lever, rest, bilateral in self._springs:
-            squeeze = rest - float(data.ten_length[tendon])
-            if squeeze > 0.0 or bilateral:
-                frame = self._frame[cover]
+        for tendon, cover, spring in self._springs:
+            squeeze = spring.lever * spring.rest - float(data.ten_length[tendon])
+            if cover and (squeeze > 0.0 or spring.bilateral):
+                frame = self._frame[cover.name]
                 along, across = data.xmat[frame.body].reshape(3, 3).T[:2]
                 force = frame.rotation.T @ across * (squeeze * float(self._model.tendon_stiffness[tendon]))
-                yield self._part(cover, force, data.xpos[frame.body] + lever * along)
+                yield self._part(cover.name, force, data.xpos[frame.body] + spring.lever * along)
 
     def _part(self, cover: str, force: np.ndarray, place: np.ndarray) -> tuple[str, PartialLoad]:
         """The load of a force in the frame of its cover, (3,), N, at a place in the base frame, (3,), m."""
-        rotation, origin, _ = self._frame[cover]
+        _, rotation, origin, _ = self._frame[cover]
         at = rotation.T.dot(place - origin)
         return cover, PartialLoad(force, np.array(cross(at.tolist(), force.tolist())), float(at[0]))
 
@@ -218,31 +199,19 @@ def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
 
 
+def sides(data: Any) -> Iterator[tuple[int, int, int, float]]:
+    """Both sides of every contact of MuJoCo: its index, the geom, the other geom, the sign of the force on the geom."""
+    for i, (first, second) in enumerate(data.contact.geom.tolist()):
+        yield i, first, second, -1.0
+        yield i, second, first, 1.0
+
+
 def contact_force(model: Any, data: Any, i: int) -> np.ndarray:
     """Force of contact i on its second geom, (3,), N, in the base frame."""
     wrench = np.zeros(6)
     mujoco.mj_contactForce(model, data, i, wrench)
     force: np.ndarray = data.contact.frame[i].reshape(3, 3).T.dot(wrench[:3])
     return force
-
-
-def half_lengths(model: Any, geom: int) -> np.ndarray:
-    """From the surface of a geom of MuJoCo to its middle along its axes, (3,), m; of a plane its size."""
-    x, y, z = model.geom_size[geom].tolist()
-    kind = model.geom_type[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return np.array((x, x, x))
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return np.array((x, x, x + y))
-    return np.array((x, x, y) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else (x, y, z))
-
-
-def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:
-    tendons = range(2 * len(arm.motors.names), model.ntendon)  # after the strands of the cables
-    for tendon, spring in zip(tendons, springs.present, strict=True):
-        if cover := sprung_cover(arm, spring.joint):
-            rest = spring.lever * spring.rest
-            yield SpringOnCover(tendon, cover.name, spring.lever, rest, spring.bilateral)
 
 
 def sprung_cover(arm: Arm, joint: str) -> Any:

@@ -1,7 +1,6 @@
 """Objects of the world that move: obstacles with a given motion, and the truth about every object."""
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -12,7 +11,7 @@ from wam_description.arm import Arm
 from wam_description.mjcf_objects import hinge_name
 from wam_description.signals import ObjectState
 from wam_description.world import World
-from wam_driver.loads import contact_force
+from wam_driver.loads import contact_force, sides
 
 Array = NDArray[np.float64]
 UNKNOWN = float("nan")
@@ -82,9 +81,14 @@ class TrueObjects:
         """The state of every object at the start of the last step."""
         if not self.names:
             return []
-        by_arm, by_others = np.zeros((len(self.names), 6)), np.zeros((len(self.names), 6))
-        for i, wrench, is_arm in self._contacts():
-            (by_arm if is_arm else by_others)[i] += wrench
+        data, wrenches = self._data, np.zeros((2, len(self.names), 6))
+        for k, geom, other, sign in sides(data):
+            if geom in self._index:
+                i, force = self._index[geom], contact_force(self._model, data, k)
+                lever = data.contact.pos[k] - data.xpos[self._bodies[i]]
+                by = wrenches[int(other in self._covers), i]
+                by += sign * np.concatenate([force, np.cross(lever, force)])
+        by_others, by_arm = wrenches
         return [self._state(i, name, by_arm[i], by_others[i, :3]) for i, name in enumerate(self.names)]
 
     def _state(self, i: int, name: str, by_arm: Array, by_others: Array) -> ObjectState:
@@ -98,17 +102,3 @@ class TrueObjects:
         angle = float(data.qpos[self._angles[name]]) if name in self._angles else UNKNOWN
         pose, moves = (*data.xpos[body].tolist(), x, y, z, w), velocity.tolist()
         return ObjectState._make((i, *pose, *moves, angle, *by_arm.tolist(), *by_others.tolist()))
-
-    def _contacts(self) -> Iterator[tuple[int, Array, bool]]:
-        """Index of each touched object, force on it and torque about it, (6,), and whether these are the arm's."""
-        data = self._data
-        for k in range(data.ncon):
-            first, second = data.contact.geom[k].tolist()
-            touched = [(geom, sign) for geom, sign in ((first, -1.0), (second, 1.0)) if geom in self._index]
-            if touched:
-                force = contact_force(self._model, data, k)
-                is_arm = first in self._covers or second in self._covers
-                for geom, sign in touched:
-                    i = self._index[geom]
-                    lever = data.contact.pos[k] - data.xpos[self._bodies[i]]
-                    yield i, sign * np.concatenate([force, np.cross(lever, force)]), is_arm

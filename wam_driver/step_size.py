@@ -20,7 +20,6 @@ from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError, rows
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
-from wam_driver.loads import half_lengths
 from wam_driver.thresholds import PLANT
 
 Array = NDArray[np.float64]
@@ -95,46 +94,44 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, inertia)
         yield Linearised(inertia.copy(), stiffness, damping, "cables, rotors, springs and hinges")
-        for reach, k, b, where in _contacts(model, data, arm, world):
+        for reach, k, b, where in _contacts(model, data, arm, world, inertia):
             square = np.outer(reach, reach)
             yield Linearised(inertia.copy(), stiffness + k * square, damping + b * square, where)
 
 
-def _contacts(model: Any, data: Any, arm: Arm, world: World) -> Iterator[tuple[Array, float, float, str]]:
+def _contacts(
+    model: Any, data: Any, arm: Arm, world: World, inertia: Array
+) -> Iterator[tuple[Array, float, float, str]]:
     """Velocity of both ends of each cover per joint velocity, (m,), along each axis, and the surface there."""
     touched = list(contact_pairs(arm, world))
-    loosest = {name: _loosest(model, data, name) for name in world.objects if name not in world.moving}
+    loosest = {name: _loosest(model, data, name, inertia) for name in world.objects if name not in world.moving}
     for one in touched:
         if not one.is_shared:  # of one corner; where all others touch, too, the body moves as a whole
             reach = loosest[one.first] - loosest.get(one.second, 0.0)
             yield reach, one.stiffness, one.damping, one.what
-    jacobian = np.zeros((3, model.nv))
     for cover in rows(arm.covers):
         site = model.site(f"{cover.name}_frame").id
         rotation, origin = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
         for end in (cover.start, cover.end):
-            mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(cover.link).id)
-            for axis, one in ((a, s) for a in range(3) for s in touched):
+            jacobian = _jacobian(model, data, cover.link, origin + rotation @ np.array(end))
+            for axis, one in itertools.product(range(3), touched):
                 if cover.name == one.first or folded(cover.name) == one.second:
                     k = one.stiffness * math.sqrt(1.0 + 4.0 * one.hardening * PLANT.hardened_at / one.stiffness)
-                    reach = rotation[:, axis] @ jacobian
-                    if one.second in loosest:
-                        reach = reach - loosest[one.second]
+                    reach = rotation[:, axis] @ jacobian - loosest.get(one.second, 0.0)
                     yield reach, k, one.damping, f"{one.what} on {cover.name}"
 
 
-def _loosest(model: Any, data: Any, name: str) -> Array:
+def _loosest(model: Any, data: Any, name: str, inertia: Array) -> Array:
     """Velocity per joint velocity, (m,), of the corner of an object, along the axis, where it has the least inertia."""
-    geom, body = model.geom(name).id, model.body(name).id
-    jacobian, found, most = np.zeros((3, model.nv)), np.zeros(model.nv), -1.0
-    inertia = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, inertia)
-    half = half_lengths(model, geom)
-    rotation = data.geom_xmat[geom].reshape(3, 3)
-    for signs in itertools.product((-1.0, 1.0), repeat=3):
-        mujoco.mj_jac(model, data, jacobian, None, data.geom_xpos[geom] + rotation @ (half * signs), body)
-        for reach in rotation.T @ jacobian:
-            mobility = float(reach @ np.linalg.solve(inertia, reach))
-            if mobility > most:
-                found, most = reach.copy(), mobility
+    geom = model.geom(name).id
+    rotation, half = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom, 3:]
+    corners = (data.geom_xpos[geom] + rotation @ (half * signs) for signs in itertools.product((-1.0, 1.0), repeat=3))
+    reaches = [reach for corner in corners for reach in rotation.T @ _jacobian(model, data, name, corner)]
+    return max(reaches, key=lambda reach: float(reach @ np.linalg.solve(inertia, reach)))
+
+
+def _jacobian(model: Any, data: Any, body: str, point: Array) -> Array:
+    """Velocity of a point of a body per joint velocity, (3, m)."""
+    found = np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, found, None, point, model.body(body).id)
     return found
