@@ -22,21 +22,20 @@ from mujoco import mj_step1, mj_step2
 
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
-from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
-from wam_description.parameters import ParameterError, each
+from wam_description.parameters import each
 from wam_description.signals import Load, ObjectState
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
 from wam_driver.dry_friction import DryFriction
 from wam_driver.friction import COULOMB_STICTION, FrictionParameters
-from wam_driver.loads import AppliedPush, CoverLoads
+from wam_driver.loads import CoverLoads
 from wam_driver.objects import MovingObstacle, TrueObjects
 from wam_driver.pusher import Pusher
 from wam_driver.step_size import require_fitting_step
-from wam_driver.surfaces import Mover, SurfaceLaw, Surfaces
+from wam_driver.surfaces import Mover, Surfaces
 from wam_driver.thresholds import PLANT
 
 WARNINGS = {
@@ -127,15 +126,15 @@ class Plant:
         self._surfaces = Surfaces(self.model, self.data, arm, world, movers, step)
         self._view = _View(self.model, self.data, n)
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
-        is_plain = self._friction.is_steady and not movers and not self._circuits.is_bounded  # what the steps in C do
-        shared = self._surfaces.laws, self._friction, self._circuits, self._loads.pushes
-        self._advance = _compiled_steps(self.model, self.data, *shared, step) if is_plain else None
+        # what the steps in C do
+        is_plain = self._friction.is_steady and not movers and not self._circuits.is_bounded
+        self._advance = self._compiled_steps(step) if is_plain else None
         # to look them up in each step costs 3 % of it
         bounds, after_step = (*self._friction.bounds, self._friction.direction), self._circuits.after_step
         velocities = self._view.velocities.tolist
         self._in_steps = self.model, self.data, self._loads.pushes, movers, velocities, *bounds, after_step
         self._rest()
-        _require_free_start(self.model, self.data, arm, world)
+        self._surfaces.require_free_start(arm)
         self._kept = self._view.position.tolist(), self._view.plastic.tolist()
         self.set_pretension(effects.pretension_share)
         require_fitting_step(self.model, arm, world, step)
@@ -282,6 +281,35 @@ class Plant:
         else:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
 
+    def _compiled_steps(self, step: float) -> Callable[[SupportsIndex, bool, Callable[[], object]], list[float]] | None:
+        """What advances the plant in C, by steps of this length, s; None where it is not built for this MuJoCo."""
+        try:
+            built: Any = importlib.import_module("wam_driver.fast_steps")
+            library = ctypes.CDLL(f"libmujoco.so.{mujoco.__version__}")  # which mujoco has loaded already
+            names = ("mj_step1", "mj_step2", "mj_applyFT", "_mjPRIVATE_setTlsLogHandler", "mjcb_time")
+            found = [library[name] for name in names]
+        except (ImportError, OSError, AttributeError):
+            return None
+        if mujoco.mj_version() != built.MUJOCO:
+            return None
+        friction, circuits = self._friction, self._circuits
+        prepared = built.prepare(
+            self.model._address,
+            self.data._address,
+            *[ctypes.cast(one, ctypes.c_void_p).value for one in found],
+            mujoco.FatalError,
+            self._surfaces.laws,
+            *friction.bounds,
+            friction.direction,
+            circuits.each if circuits.depends_on_torque else [],
+            circuits,
+            self._loads.pushes,
+            step,
+            PLANT.smallest_depth,
+            float(PLANT.sharpness),
+        )
+        return partial(built.advance, prepared)
+
     def _advance_in_python(self, count: SupportsIndex) -> list[float]:
         """Advance by steps with the torque that is set; velocities of rotors and joints before the last, rad/s."""
         model, data, pushes, movers, velocities, lows, highs, direction, after_step = self._in_steps
@@ -407,80 +435,6 @@ class Plant:
     def objects(self) -> list[ObjectState]:
         """The true state of every free body, door and moving obstacle, in the order of `World.objects`."""
         return self._objects.measure()
-
-
-def _compiled_steps(
-    model: Any,
-    data: Any,
-    laws: list[SurfaceLaw],
-    friction: DryFriction,
-    circuits: CableCircuits,
-    pushes: dict[str, AppliedPush],
-    step: float,
-) -> Callable[[SupportsIndex, bool, Callable[[], object]], list[float]] | None:
-    """What advances a plant in C; None where it has not been built, or for another MuJoCo.
-
-    Parameters
-    ----------
-    model, data : of MuJoCo; they have to live as long as what is returned.
-    laws : of `Surfaces`.
-    friction, circuits : of the plant.
-    pushes : of `CoverLoads`.
-    step : of the plant, s.
-    """
-    try:
-        built: Any = importlib.import_module("wam_driver.fast_steps")
-        library = ctypes.CDLL(f"libmujoco.so.{mujoco.__version__}")  # which mujoco has loaded already
-        names = ("mj_step1", "mj_step2", "mj_applyFT", "_mjPRIVATE_setTlsLogHandler", "mjcb_time")
-        found = [library[name] for name in names]
-    except (ImportError, OSError, AttributeError):
-        return None
-    if mujoco.mj_version() != built.MUJOCO:
-        return None
-    addresses = [ctypes.cast(one, ctypes.c_void_p).value for one in found]
-    each = circuits.each if circuits.depends_on_torque else []
-    lists = (laws, *friction.bounds, friction.direction, each)
-    constants = (step, PLANT.smallest_depth, float(PLANT.sharpness))
-    prepared = built.prepare(
-        model._address, data._address, *addresses, mujoco.FatalError, *lists, circuits, pushes, *constants
-    )
-    return partial(built.advance, prepared)
-
-
-def _require_free_start(model: Any, data: Any, arm: Arm, world: World) -> None:
-    """Refuse a world in which something is inside the arm at power-up: it would push it out with k_c times the depth.
-
-    What touches it, or presses it softly, is no mistake: an arm may lean on foam.
-
-    Parameters
-    ----------
-    model, data : of MuJoCo, with the contacts of the start pose.
-    arm, world : the covers and what they may touch.
-
-    Raises
-    ------
-    ParameterError
-        names what is inside, the cover and its link, and the depth.
-    """
-    links = dict(zip(arm.covers.names, arm.covers.links, strict=True))
-    own = {folded(name) for name in links}  # a folded arm is no mistake
-    pairs = {
-        frozenset((one.first, one.second)): one
-        for one in contact_pairs(arm, world)
-        if one.first in links and one.second not in own
-    }
-    depths: dict[str, float] = {}
-    for geoms, distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
-        pair = pairs.get(frozenset(model.geom(geom).name for geom in geoms))
-        if pair is not None and -distance > PLANT.deepest and -distance * pair.stiffness > PLANT.hardest:
-            inside = f"{pair.what} is {{}} mm inside cover '{pair.first}' of {links[pair.first]}"
-            depths[inside] = max(depths.get(inside, 0.0), -distance)
-    if depths:
-        found = " and ".join(inside.format(f"{1e3 * depth:.3g}") for inside, depth in depths.items())
-        raise ParameterError(
-            f"at power-up {found}; allowed: up to {1e3 * PLANT.deepest:g} mm, or a contact force of {PLANT.hardest:g} N"
-            "; move it away from the arm (world), or start the arm in another pose (arm.joints.start)"
-        )
 
 
 def _unheard(_: str) -> None:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
-from wam_description.contact_pairs import contact_pairs
+from wam_description.contact_pairs import contact_pairs, folded
+from wam_description.parameters import ParameterError
 from wam_description.world import World
 from wam_driver.thresholds import PLANT
 
@@ -51,11 +52,38 @@ class Surfaces:
         self._pair = {geoms: i for i, pair in enumerate(pairs) for geoms in (pair, pair[::-1])}
         self._mover = {model.geom(mover.name).id: mover for mover in movers}
         given = {one.name: one for one in contact_pairs(arm, world)}
-        laws = [given[model.pair(i).name] for i in range(model.npair)]
+        self._given = [given[model.pair(i).name] for i in range(model.npair)]
         self.laws: list[SurfaceLaw] = [
             (*pair, float(law.stiffness), float(law.damping), float(law.hardening), size, law.is_shared)
-            for pair, law, size in zip(pairs, laws, model.pair_dim.tolist(), strict=True)
+            for pair, law, size in zip(pairs, self._given, model.pair_dim.tolist(), strict=True)
         ]
+
+    def require_free_start(self, arm: Arm) -> None:
+        """Refuse a world in which something is inside the arm now: it would push it out with k_c times the depth.
+
+        What touches it, or presses it softly, is no mistake: an arm may lean on foam.
+
+        Raises
+        ------
+        ParameterError
+            names what is inside, the cover and its link, and the depth.
+        """
+        links = dict(zip(arm.covers.names, arm.covers.links, strict=True))
+        own = {folded(name) for name in links}  # a folded arm is no mistake
+        depths: dict[str, float] = {}
+        for (first, second), distance in zip(self._contact.geom.tolist(), self._contact.dist.tolist(), strict=True):
+            pair, depth = self._given[self._pair[first, second]], -distance
+            is_within = depth > PLANT.deepest and depth * pair.stiffness > PLANT.hardest
+            if is_within and pair.first in links and pair.second not in own:
+                inside = f"{pair.what} is {{}} mm inside cover '{pair.first}' of {links[pair.first]}"
+                depths[inside] = max(depths.get(inside, 0.0), depth)
+        if depths:
+            found = " and ".join(inside.format(f"{1e3 * depth:.3g}") for inside, depth in depths.items())
+            raise ParameterError(
+                f"at power-up {found}; allowed: up to {1e3 * PLANT.deepest:g} mm, or a contact force of "
+                f"{PLANT.hardest:g} N; move it away from the arm (world), or start the arm in another pose "
+                "(arm.joints.start)"
+            )
 
     def apply(self) -> None:
         """Make each contact's force k_c depth + b_c speed, and let it stick within its friction cone.
