@@ -33,6 +33,7 @@ class Pacer:
     Attributes
     ----------
     slips : periods that were more than `slack` late.
+    passed : simulated time and time of the wall clock while it passed, s; pauses do not count.
     """
 
     def __init__(self, factor: float, now: Callable[[], float]) -> None:
@@ -40,17 +41,15 @@ class Pacer:
         self.slips = 0
         self._behind = 0.0
         self._origin = 0.0  # of the wall clock, when the stamp 0 would have been due
-        self._start: tuple[float, int] | None = None  # of this run: wall clock, stamp
-        self._newest: tuple[float, int] = (0.0, 0)
-        self._before = (0.0, 0.0)  # simulated and elapsed time, s, of the runs before a restart
-        self._reported = (0.0, 0.0)
+        self._last: tuple[float, int] | None = None  # wall clock and stamp of the last period since a restart
+        self.passed = self._reported = (0.0, 0.0)
 
     def is_due(self, stamp: int) -> bool:
         """Whether the period that ends with the state of `stamp`, ns, may pass now; call it before each."""
         now = self._now()
         simulated = seconds(stamp)
-        if self._start is None:
-            self._start = (now, stamp)
+        if self._last is None:
+            self._last = now, stamp
             if self._factor:
                 self._origin = now - simulated / self._factor
         elif self._factor:
@@ -61,21 +60,14 @@ class Pacer:
             if late > DRIVER.slack:
                 self._origin += late - DRIVER.slack
                 self.slips += 1
-        self._newest = (now, stamp)
+        before, then = self._last
+        self.passed = self.passed[0] + seconds(stamp - then), self.passed[1] + (now - before)
+        self._last = now, stamp
         return True
 
     def restart(self) -> None:
         """Time was stopped or stepped by hand: the next period is due at once, and what was missed is not made up."""
-        self._before, self._start = self.passed, None
-
-    @property
-    def passed(self) -> tuple[float, float]:
-        """Simulated time and time of the wall clock while it passed, s; pauses do not count."""
-        simulated, elapsed = self._before
-        if self._start is not None:
-            simulated += seconds(self._newest[1] - self._start[1])
-            elapsed += self._newest[0] - self._start[0]
-        return simulated, elapsed
+        self._last = None
 
     def report(self) -> Pace:
         """The pace since the last report."""
