@@ -80,5 +80,6 @@ class Host:
         return found
 
     def write(self, node: int, name: str, value: int) -> None:
-        """Write a property of a node."""
+        """Write a property of a node, which takes some time for it."""
         self.send(frames.put(node, self.number(node, name), value))
+        self.line.sleep(BUS.between_writes)

@@ -74,11 +74,6 @@ class StartUp(Host):
         self.write(SAFETY, "IFAULT", BUS.ignored_velocities)
         return motors
 
-    def write(self, node: int, name: str, value: int) -> None:
-        """Write a property of a node, which takes some time for it."""
-        super().write(node, name, value)
-        self.line.sleep(BUS.between_writes)
-
     def _await_idle(self) -> Iterator[Wait]:
         """Until the safety module is idle: in E-stop no controller answers, active it needs the positions."""
         while self.ask(SAFETY, "STAT") is None:
