@@ -53,8 +53,8 @@ class CableCircuits:
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
         n = len(arm.motors.names)
         friction_counts = effects.slack and any(effects.tension_friction)
-        self._is_terminated, self._capstan = effects.creep and effects.terminated, effects.capstan
-        self.is_bounded = self._is_terminated or self._capstan > 0.0
+        self._capstan = effects.capstan
+        self.is_bounded = (effects.creep and effects.terminated) or effects.capstan > 0.0
         self.depends_on_torque = effects.creep or friction_counts or self.is_bounded
         self.is_slack = False
         self._may_slacken = effects.slack
@@ -69,7 +69,8 @@ class CableCircuits:
         # with backlash the ends are those of the play
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
         self._damping = [circuit.damping for circuit in arm.circuits]
-        self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
+        creeps = effects.creep and not effects.terminated  # by travel alone
+        self._losses = [step * circuit.loss_per_torque if creeps else 0.0 for circuit in arm.circuits]
         self.each: list[tuple[int, int, float, float]] = []
         self._prepare()
 
@@ -133,30 +134,25 @@ class CableCircuits:
 
     def _follow_bounded(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """`follow` for cables that end on both pulleys, or slip as a whole at the capstan's limit (6.16)."""
-        if self._is_terminated:
-            ends, theta = self._slack_ends, self._theta.tolist()
-            for cable, (first, second, _, _), angle, speed, pull in zip(  # noqa: B905 - as `follow`
-                self._wound, self.each, theta, speeds, self._pulls()
-            ):
-                crept = cable.creep(angle, abs(speed) * self._step, pull)
-                ends[first] -= crept
-                ends[second] -= crept
-            return self.follow([0] * len(self.each), speeds)
-        self._slip()
+        moved = self._slips() if self._capstan else self._creeps(speeds)
+        for (first, second, _, _), more in zip(self.each, moved, strict=True):
+            self._slack_ends[first] -= more
+            self._slack_ends[second] -= more
         return self.follow(direction, speeds)
 
-    def _slip(self) -> None:
-        """Move the ends of each cable whose torque would be beyond its limit after this step."""
-        rates = self._stretch_rate.tolist()
-        for (first, second, _, _), circuit, rate, pull in zip(
-            self.each, self._circuits, rates, self._pulls(), strict=True
-        ):
+    def _creeps(self, speeds: Sequence[float]) -> list[float]:
+        """Creep of each cable that ends on both pulleys, rad, in this step."""
+        each = zip(self._wound, self._theta.tolist(), speeds, self._pulls(), strict=False)
+        return [cable.creep(angle, abs(speed) * self._step, pull) for cable, angle, speed, pull in each]
+
+    def _slips(self) -> list[float]:
+        """Slip of each cable, rad, whose torque would be beyond its limit after this step."""
+        found = []
+        for circuit, rate, pull in zip(self._circuits, self._stretch_rate.tolist(), self._pulls(), strict=True):
             limit = 2.0 * circuit.pretension * circuit.radius * math.tanh(0.5 * self._capstan)
             after = pull - circuit.stiffness * rate * self._step
-            if abs(after) > limit:
-                slipped = math.copysign(abs(after) - limit, after) / circuit.stiffness
-                self._slack_ends[first] -= slipped
-                self._slack_ends[second] -= slipped
+            found.append(math.copysign(max(abs(after) - limit, 0.0), after) / circuit.stiffness)
+        return found
 
     def follow(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.
