@@ -310,10 +310,8 @@ class Driver:
     @property
     def recent(self) -> list[DriverSample]:
         """The last periods, up to the last fault."""
-        n = len(self._zero)
-        each = [slice(i, i + n) for i in range(1, 1 + 4 * n, n)]
-        rows = (list(self._sample.unpack(packed)) for packed in self._recent)
-        return [DriverSample(row[0], *(row[part] for part in each)) for row in rows]
+        rows = map(self._sample.unpack, self._recent)
+        return [DriverSample(stamp, *np.reshape(values, (4, -1)).tolist()) for stamp, *values in rows]
 
     @property
     def true_joint_state(self) -> State:
@@ -335,4 +333,6 @@ class Driver:
             "sim/contact/wrench": Wrench(frame, load.force, load.moment),
             "sim/contact/point": Point(frame, (load.position, 0.0, 0.0)),
         }
-        return {**found, "sim/objects": Table(BASE, tuple(objects))} if objects else found
+        if objects:
+            found["sim/objects"] = Table(BASE, tuple(objects))
+        return found

@@ -4,6 +4,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 from wam_description.interface import declared
 from wam_description.signals import Answer, Wrench
 from wam_driver.arm_driver_node import ArmDriver
-from wam_driver.driver import Driver
+from wam_driver.driver import Driver, DriverSample
 from wam_driver.lockstep import Lockstep
 from wam_driver.realtime import Realtime
 from wam_driver.thresholds import DRIVER
@@ -108,16 +109,12 @@ class DriverNode(ArmDriver):
     # the beginning
 
     @property
-    def awaited(self) -> str:
-        """Nodes without which lockstep does not start, '' once it has."""
-        if self.time.is_started:
-            return ""
-        return ", ".join(self.peers.absent or self.session.silent) or "the peers of the driver"
-
-    @property
     def unready(self) -> str:
         """What the arm still lacks before the brakes may be released, '' where nothing."""
-        return f"not connected yet: {self.awaited}; start what is missing, then enable" if self.awaited else ""
+        if self.time.is_started:
+            return ""
+        awaited = ", ".join(self.peers.absent or self.session.silent) or "the peers of the driver"
+        return f"not connected yet: {awaited}; start what is missing, then enable"
 
     def is_waiting(self) -> bool:
         """Whether a realtime driver waits for all nodes, and for a computer that keeps the periods."""
@@ -182,9 +179,9 @@ class DriverNode(ArmDriver):
             return
         path = Path(self._directory) / f"post_mortem_{self.stamp}.csv"
         motors, recent = self.shared.arm.motors.names, self.driver.recent
-        names = [f"{what} {motor}" for what in ("theta", "thetad", "commanded", "actual") for motor in motors]
+        names = [f"{what} {motor}" for what in DriverSample._fields[1:] for motor in motors]
         rows = [",".join(["stamp", *names])]
-        rows += [",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.commanded, *s.actual))) for s in recent]
+        rows += [",".join(map(repr, (stamp, *chain(*values)))) for stamp, *values in recent]
         with self._warning_of_failure():
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text("\n".join(rows) + "\n", encoding="utf-8")

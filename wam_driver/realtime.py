@@ -85,7 +85,10 @@ class Realtime:
         if self.is_paused:
             return
         self._missed += due - 1
-        self._note(due)
+        self._recent.append(due)
+        self._recent_done += due
+        while self._recent_done > DRIVER.window and len(self._recent) > 1:
+            self._recent_done -= self._recent.popleft()
         age = now - self._progress
         most = max(1, round(self._watchdog / self._timing.period))
         if due > most and self._driver.safety.mode is Mode.ENABLED:
@@ -99,13 +102,6 @@ class Realtime:
             self._driver.advance(age)
             if left == 0 or self._driver.is_outer:
                 self._send()
-
-    def _note(self, due: int) -> None:
-        """Keep how many periods were due at the ticks in the window."""
-        self._recent.append(due)
-        self._recent_done += due
-        while self._recent_done > DRIVER.window and len(self._recent) > 1:
-            self._recent_done -= self._recent.popleft()
 
     def settles(self) -> bool:
         """Whether the arm waits for few late periods; called again and again once all nodes are connected."""

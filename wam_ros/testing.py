@@ -305,7 +305,7 @@ class RunningArm:
         ArmFault
             where the driver refuses it.
         """
-        self.run_until(lambda: self.stamp > 0 and not self.nodes["driver"].awaited)
+        self.run_until(lambda: self.stamp > 0 and not self.nodes["driver"].unready)
         answer = self.call("driver/enable", True)
         if not answer.success:
             raise ArmFault(answer.message)
