@@ -100,6 +100,7 @@ class Driver:
 
     Attributes
     ----------
+    timing, parameters : of this driver.
     stamp : time of the present state, ns, strictly increasing.
     is_outer : whether the joint side works on the present state.
     motor_state : angle, velocity and torque of each motor, as measured.
@@ -131,7 +132,7 @@ class Driver:
         self._recent: deque[bytes] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
-        self._arm, self._timing, self._parameters, self._push_excess = arm, timing, parameters, shared.push_excess
+        self._arm, self.timing, self.parameters, self._push_excess = arm, timing, parameters, shared.push_excess
         self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
@@ -156,8 +157,8 @@ class Driver:
 
     def _begin_period(self, tick: int) -> None:
         self._tick = tick
-        self.stamp = tick * self._timing.period_ns
-        self.is_outer = self._timing.is_outer(self.stamp)
+        self.stamp = tick * self.timing.period_ns
+        self.is_outer = self.timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: Sequence[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns.
@@ -165,7 +166,7 @@ class Driver:
         The command is ignored unless the driver is enabled.  It is also ignored if its state is older than the
         state that was last answered or than the release of the brakes, or lies in the future.
         """
-        tick = stamp // self._timing.period_ns
+        tick = stamp // self.timing.period_ns
         if self.safety.mode is Mode.ENABLED and self._command_tick <= tick <= self._tick:
             self._command = list(currents)
             self._command_tick = tick
@@ -181,19 +182,19 @@ class Driver:
         if self._disturbed and self._tick > self._disturbed_until:
             self._end_disturbance()
         if enabled:
-            age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
-            if age >= self._parameters.watchdog:
-                allowed_ms = self._parameters.watchdog * 1e3
+            age = max((self._tick - self._command_tick) * self.timing.period, arrival_age)
+            if age >= self.parameters.watchdog:
+                allowed_ms = self.parameters.watchdog * 1e3
                 self.safety.trip(
                     fault("command_stale", age_ms=age * 1e3, allowed_ms=allowed_ms, cure=self.stale_advice())
                 )
                 enabled = False
         self.plant.brake(not enabled)
-        self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
+        self.currents = self.amplifier.step(self._command if enabled else self._zero, self.timing.period)
         torque = self.amplifier.torque(self.currents, self.plant.theta) if enabled else self._zero
-        if self.is_outer and self._parameters.friction.warm_drop:
+        if self.is_outer and self.parameters.friction.warm_drop:
             self.plant.heat(self.amplifier.heat)
-        self.plant.step(torque, self._timing.substeps)
+        self.plant.step(torque, self.timing.substeps)
         if trouble := self.plant.trouble():
             self.plant.recover()
             self.safety.trip(fault("simulation", trouble=trouble, **self._pushed))
@@ -205,16 +206,18 @@ class Driver:
             self._recent.append(self._packed(self.stamp, *theta, *thetad, *self._command, *self.currents))
         self._pulls.append(self.plant.cable_pull)
         if self.is_outer:
-            if enabled:
-                self._watch_limits()
-            else:
-                self._watch_braking()
+            self._watch_limits(enabled)
 
-    def _watch_limits(self) -> None:
-        """Trip on the first quantity above its limit; warn of those near it."""
+    def _watch_limits(self, enabled: bool) -> None:
+        """Trip on the first quantity above its limit; warn of those near it.  Braked, only the cables can break."""
+        tensions = self.plant.tensions(list(map(max, self._zero, *self._pulls)))
+        self._pulls.clear()
+        if not enabled:
+            if broken := excess(self._watch.tensions(tensions), "broken"):
+                self.safety.damage(broken)
+            return
         if pushed := self.plant.pushes_in_words():
             self._last_push = pushed, self._tick
-        tensions = self._largest_tensions()
         watched = self._watch.watched(*self._turned, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
         self.warnings += [
@@ -231,20 +234,8 @@ class Driver:
     def _pushed(self) -> dict[str, Value]:
         """The push that acts, or acted a short time before, s; '' for none."""
         pushed, tick = self._last_push
-        ago = (self._tick - tick) * self._timing.period
+        ago = (self._tick - tick) * self.timing.period
         return {"push": pushed * (ago <= DRIVER.recent), "ago": ago}
-
-    def _watch_braking(self) -> None:
-        """Name the first cable that breaks under the brakes."""
-        tensions = self._largest_tensions()
-        if broken := excess(self._watch.tensions(tensions), "broken"):
-            self.safety.damage(broken)
-
-    def _largest_tensions(self) -> list[float]:
-        """Tension of the tight strand of each cable, N, (n,), the largest since the last check."""
-        tensions = self.plant.tensions(list(map(max, self._zero, *self._pulls)))
-        self._pulls.clear()
-        return tensions
 
     def disturb(self, wrench: Wrench) -> None:
         """Take a message of `sim/disturbance`: the one push of messages, in the base frame none; see `Plant.push`.
@@ -300,7 +291,7 @@ class Driver:
         return Answer(True, f"{self.safety.mode.value}: arm back at its start pose")
 
     def _measure(self) -> None:
-        plant, period = self.plant, self._timing.period
+        plant, period = self.plant, self.timing.period
         torque = self.amplifier.nominal_torque(self.currents)
         self._turned = theta, thetad = plant.theta, plant.thetad
         self.motor_state = self._sensors.motors.read(State(theta, thetad, torque), period)

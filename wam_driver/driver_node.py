@@ -42,7 +42,6 @@ class DriverNode(ArmDriver):
         if timing.mode == "lockstep":
             self.time = Lockstep(
                 self.driver,
-                timing,
                 interface,
                 self.session,
                 self._publish,
@@ -54,15 +53,7 @@ class DriverNode(ArmDriver):
             if timing.real_time_factor:
                 self.create_timer(timing.period / timing.real_time_factor, self.time.go_on)
             return  # the first status goes to all peers
-        self.time = Realtime(
-            self.driver,
-            timing,
-            own.watchdog,
-            own.late_periods,
-            self._publish,
-            time.perf_counter,
-            lambda: self.peers.held_up(STEPS.nodes),
-        )
+        self.time = Realtime(self.driver, self._publish, time.perf_counter, lambda: self.peers.held_up(STEPS.nodes))
         advice, senders = self.driver.stale_advice, interface.publishers("motor_current_command")
         self.driver.stale_advice = lambda: "; ".join(
             filter(None, (self.peers.held_up(senders) or advice(), self.lateness))

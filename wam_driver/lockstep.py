@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from wam_description.arm import Timing
 from wam_description.event import Event, fault
 from wam_description.interface import Interface
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
@@ -33,7 +32,6 @@ class Lockstep:
     Parameters
     ----------
     driver : to be advanced.
-    timing : periods, pace and time-out.
     interface : of the bring-up, whose nodes answer each state; a scenario answers those of outer periods.
     session : that the nodes follow.
     publish : called after each period, to publish the new state.
@@ -50,7 +48,6 @@ class Lockstep:
     def __init__(
         self,
         driver: Driver,
-        timing: Timing,
         interface: Interface,
         session: Session,
         publish: Callable[[], None],
@@ -58,6 +55,7 @@ class Lockstep:
         stop: Callable[[Event], None],
         now: Callable[[], float],
     ) -> None:
+        timing = driver.timing
         self._driver, self._timing, self._interface = driver, timing, interface
         self._is_played = "scenario" in interface.names
         topics = ["motor_current_command", *["sim/disturbance"] * self._is_played]

@@ -4,7 +4,6 @@ import math
 from collections import deque
 from collections.abc import Callable
 
-from wam_description.arm import Timing
 from wam_description.event import fault
 from wam_driver.driver import Driver
 from wam_driver.safety import Mode
@@ -16,10 +15,7 @@ class Realtime:
 
     Parameters
     ----------
-    driver : to be advanced.
-    timing : periods.
-    watchdog : age of the last command that is a fault, s.
-    late_periods : part of the newest periods that may be late; with more the brakes stay on, and the reason of a fault
+    driver : to be advanced; where more than its `late_periods` are late, the brakes stay on, and the reason of a fault
         names the computer, too.
     publish : called after a period, to publish the new state.
     now : steady clock, s.
@@ -36,15 +32,12 @@ class Realtime:
     def __init__(
         self,
         driver: Driver,
-        timing: Timing,
-        watchdog: float,
-        late_periods: float,
         publish: Callable[[], None],
         now: Callable[[], float],
         held_up: Callable[[], str] = lambda: "",
     ) -> None:
         self._held_up = held_up
-        self._driver, self._timing, self._watchdog, self._late_periods = driver, timing, watchdog, late_periods
+        self._driver, self._timing, self._parameters = driver, driver.timing, driver.parameters
         self._publish, self._now = publish, now
         self._latencies: list[float] = []
         self._published: deque[tuple[int, float]] = deque(maxlen=100)
@@ -90,9 +83,9 @@ class Realtime:
         while self._recent_done > DRIVER.window and len(self._recent) > 1:
             self._recent_done -= self._recent.popleft()
         age = now - self._progress
-        most = max(1, round(self._watchdog / self._timing.period))
+        most = max(1, round(self._parameters.watchdog / self._timing.period))
         if due > most and self._driver.safety.mode is Mode.ENABLED:
-            late = {"time": due * self._timing.period, "allowed": self._watchdog}
+            late = {"time": due * self._timing.period, "allowed": self._parameters.watchdog}
             cure = "give it a processor of its own, or use lockstep"
             event = fault("node_late", what="driver", cure=cure, **late)
             if step := self._held_up():
@@ -111,7 +104,7 @@ class Realtime:
             self._recent.clear()
             self._recent_done = 0
         waited = now - self._connected
-        if self._late_periods == 1.0 or waited >= DRIVER.longest_settling:
+        if self._parameters.late_periods == 1.0 or waited >= DRIVER.longest_settling:
             return False
         return waited < DRIVER.settling or bool(self.lateness)
 
@@ -119,9 +112,9 @@ class Realtime:
     def lateness(self) -> str:
         """How many of the newest periods were late and what to do about it, '' where few were."""
         count, late = self._recent_done, self._recent_done - len(self._recent)
-        if late <= self._late_periods * count:
+        if late <= self._parameters.late_periods * count:
             return ""
-        part, allowed = 100.0 * late / count, 100.0 * self._late_periods
+        part, allowed = 100.0 * late / count, 100.0 * self._parameters.late_periods
         return (
             f"{part:.3g} % of the newest periods were late; allowed: {allowed:.3g} %; "
             "this computer is too busy or too slow for realtime; end other programs, or use lockstep"
@@ -135,7 +128,7 @@ class Realtime:
         """What speaks against a release of the brakes now, '' where nothing does."""
         now = self._now()
         self._progress = now
-        if now - self.command_came > self._watchdog:
+        if now - self.command_came > self._parameters.watchdog:
             return "no motor_current_command arrives; start velocity_loop and its peers, then enable"
         return self.lateness if now - self._connected >= DRIVER.settling else ""
 

@@ -103,7 +103,6 @@ class Bench:
         self.driver = Driver(replace(CONFIGURATION.shared, timing=timing), PARAMETERS)
         self.clock = FalseClock()
         self.sent: list[int] = []
-        self.timing = timing
         self.session, self.running = Session(["gravity", "velocity_loop"]), ["gravity", "velocity_loop"]
 
     def call_the_roll(self) -> None:
@@ -116,7 +115,6 @@ class Bench:
     def lockstep(self) -> Lockstep:
         found = Lockstep(
             self.driver,
-            self.timing,
             Interface(CONFIGURATION.shared),
             self.session,
             self.publish,
@@ -128,7 +126,8 @@ class Bench:
         return found
 
     def realtime(self, late_periods: float = 0.05) -> Realtime:
-        found = Realtime(self.driver, self.timing, PARAMETERS.watchdog, late_periods, self.publish, self.clock)
+        self.driver.parameters = replace(PARAMETERS, late_periods=late_periods)
+        found = Realtime(self.driver, self.publish, self.clock)
         found.start()
         return found
 
