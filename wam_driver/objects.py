@@ -14,7 +14,6 @@ from wam_description.world import World
 from wam_driver.loads import contact_force, sides
 
 Array = NDArray[np.float64]
-UNKNOWN = float("nan")
 
 
 class MovingObstacle:
@@ -99,6 +98,6 @@ class TrueObjects:
         else:
             mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_BODY, body, self._motion, 0)
             velocity = self._motion[3:]
-        angle = float(data.qpos[self._angles[name]]) if name in self._angles else UNKNOWN
+        angle = float(data.qpos[self._angles[name]]) if name in self._angles else math.nan
         pose, moves = (*data.xpos[body].tolist(), x, y, z, w), velocity.tolist()
         return ObjectState._make((i, *pose, *moves, angle, *by_arm.tolist(), *by_others.tolist()))

@@ -37,7 +37,8 @@ class Pusher:
         self.words, self.is_pressing = f"{given.force:.4g} N on {given.cover} by {self.name}", False
         self.velocity = np.zeros(3)
         self._model, self._data, self._step = model, data, step
-        self._mocap = int(model.body(self.name).mocapid[0])
+        mocap = int(model.body(self.name).mocapid[0])
+        self._position, self._quaternion = data.mocap_pos[mocap], data.mocap_quat[mocap]
         self._away = model.body(self.name).pos.copy()
         self._is_away = True
         cover = next(one for one in rows(arm.covers) if one.name == given.cover)
@@ -49,7 +50,7 @@ class Pusher:
         self._radius = cover.radius
         self._height = given.size[0 if given.shape == "sphere" else 2]
         self._given = given
-        self._motion, self._quaternion = np.zeros(6), np.zeros(4)
+        self._motion = np.zeros(6)
 
     def lead(self, time: float) -> None:
         """Move to the pose of the hand at a time, s since power-up."""
@@ -57,7 +58,7 @@ class Pusher:
         since = time - given.begin
         if not given.begin - given.rise <= time <= given.end + given.rise:
             if not self._is_away:
-                data.mocap_pos[self._mocap] = self._away
+                self._position[:] = self._away
                 self._is_away, self.is_pressing = True, False
             return
         self._is_away = False
@@ -72,11 +73,10 @@ class Pusher:
         self.velocity = drift + _cross(spin, rotation @ (at - self._radius * force)) + rotation @ own
         centre = rotation @ (at - (self._radius + self._height - depth) * force)
         carried = drift + _cross(spin, centre)
-        data.mocap_pos[self._mocap] = data.site_xpos[self._site] + centre + self._step * carried
+        self._position[:] = data.site_xpos[self._site] + centre + self._step * carried
         turned = rotation @ np.column_stack((self._axis, across, force))
         turned += self._step * np.cross(spin, turned.T).T
         mujoco.mju_mat2Quat(self._quaternion, turned.ravel())
-        data.mocap_quat[self._mocap] = self._quaternion
 
     def depth(self, time: float) -> tuple[float, float]:
         """Depth of the surface in the link, m, negative before they touch, and its rate, m/s."""
