@@ -194,9 +194,6 @@ class CableCircuits:
 
     def tensions(self, pulls: Sequence[float]) -> list[float]:
         """Tension of the tight strand of each first stage, N, (n,), at elastic torques of these sizes, N m, (n,)."""
-        result = []
-        for circuit, pull in zip(self._circuits, pulls, strict=True):
-            difference = pull / circuit.radius
-            is_slack = self._may_slacken and difference > 2.0 * circuit.pretension
-            result.append(difference if is_slack else circuit.pretension + difference / 2.0)
-        return result
+        each = [(one.pretension, pull / one.radius) for one, pull in zip(self._circuits, pulls, strict=True)]
+        # the whole difference of both tensions once the loose strand is slack
+        return [max(half + other / 2.0, other if self._may_slacken else 0.0) for half, other in each]
