@@ -130,14 +130,12 @@ class DriverNode(ArmDriver):
     # what comes in and goes out
 
     def _take_push(self, stamp: int, wrench: Wrench) -> None:
-        refusal = ""
         try:
             self.driver.disturb(wrench)
         except ValueError as error:
-            refusal = str(error)
-        self.time.take_push(stamp)  # also after a refused push: the state has its answer
-        if refusal:
-            raise Refused(refusal)
+            raise Refused(str(error)) from error
+        finally:
+            self.time.take_push(stamp)  # also after a refused push: the state has its answer
 
     def _pause(self, request: SetBool.Request) -> Answer:
         self.time.pause(bool(request.data))

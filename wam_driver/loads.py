@@ -39,14 +39,12 @@ class CoverFrame(NamedTuple):
 
 
 class AppliedPush(NamedTuple):
-    """A push on a cover, as it is applied and as it is measured."""
+    """A push on a cover."""
 
     site: int  # the frame of the cover
     body: int
     force: list[float]  # (3,) N, in the frame of the cover
     torque: list[float]  # (3,) N m, about its origin
-    load: PartialLoad
-    words: str  # how hard it pushes on which cover
 
 
 class CoverLoads:
@@ -85,17 +83,9 @@ class CoverLoads:
         """Push on a cover, see `Plant.push`."""
         if cover not in self._frame:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._frame)}")
-        if cover in self.pushes and self.pushes[cover][2:4] == (list(force), list(torque)):
-            return  # most often
         if any(force) or any(torque):
-            pushed, turned = np.array(force, float), np.array(torque, float)
-            (_, fy, fz), (_, ty, tz) = at_frame = pushed.tolist(), turned.tolist()
-            square = fy * fy + fz * fz  # a force along x passes through every position
-            position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
-            load = PartialLoad(pushed, turned, position)
-            size, unit = (force, "N") if any(force) else (torque, "N m")
-            frame, words = self._frame[cover], f"{math.hypot(*size):.4g} {unit} on {cover}"
-            self.pushes[cover] = AppliedPush(frame.site, frame.body, *at_frame, load, words)
+            frame = self._frame[cover]
+            self.pushes[cover] = AppliedPush(frame.site, frame.body, list(map(float, force)), list(map(float, torque)))
         else:
             self.pushes.pop(cover, None)
 
@@ -105,11 +95,13 @@ class CoverLoads:
 
     def pushes_in_words(self) -> str:
         """How hard which covers are pushed; '' where none is."""
-        return ", ".join([push.words for push in self.pushes.values()])
+        sizes = [(push.force, "N") if any(push.force) else (push.torque, "N m") for push in self.pushes.values()]
+        each = zip(sizes, self.pushes, strict=True)
+        return ", ".join([f"{math.hypot(*size):.4g} {unit} on {cover}" for (size, unit), cover in each])
 
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
-        for cover, (_, body, (x, y, z), (u, v, w), *_) in self.pushes.items():
+        for cover, (_, body, (x, y, z), (u, v, w)) in self.pushes.items():
             frame = self._frame[cover]
             (a, b, c), (d, e, f), (g, h, i) = frame.rotation.tolist()
             self._turn(
@@ -168,8 +160,11 @@ class CoverLoads:
                 yield self._part(cover, force, data.contact.pos[i])
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
-        for cover, push in self.pushes.items():
-            yield cover, push.load
+        for cover, (_, _, force, torque) in self.pushes.items():
+            (_, fy, fz), (_, ty, tz) = force, torque
+            square = fy * fy + fz * fz  # a force along x passes through every position
+            position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
+            yield cover, PartialLoad(np.array(force), np.array(torque), position)
 
     def _sprung(self) -> Iterator[tuple[str, PartialLoad]]:
         data = self._data
