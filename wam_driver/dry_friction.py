@@ -53,9 +53,10 @@ class DryFriction:
         _refuse_too_stiff([*motors.names, *joints.names], stiffness, step, compliance)
         self._laws = list(LAWS[parameters.law](static, dynamic, parameters))
         self._presliding = {i: Presliding(sigma) for i, sigma in enumerate(stiffness) if sigma > 0.0}
-        varied = zip(stiffness, self._factors, self._asymmetry, strict=True)
         self._varying = [
-            i for i, (law, more) in enumerate(zip(self._laws, varied, strict=True)) if not law.is_steady or any(more)
+            i
+            for i, law in enumerate(self._laws)
+            if not law.is_steady or stiffness[i] or self._factors[i] or self._asymmetry[i]
         ]
         self.is_steady = not self._varying
         self._tension_friction, self._circuits = effects.tension_friction, tuple(arm.circuits)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
-from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError, rows
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
@@ -82,13 +81,11 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     cables = np.hstack([np.eye(n), -TransmissionMap.of(arm).motor_from_joint, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
+    stiffness += np.diag(model.jnt_stiffness[model.dof_jntid])  # of doors
     damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)
     for spring in world.springs.present:
         at = n + arm.joints.names.index(spring.joint)
         stiffness[at, at] += spring.stiffness * spring.lever * spring.lever
-    for door in world.doors.present:
-        at = int(model.joint(hinge_name(door.name)).dofadr[0])
-        stiffness[at, at] += door.spring
     for q in (arm.joints.start, (0.0,) * n):
         data.qpos[n : 2 * n] = q
         mujoco.mj_forward(model, data)
