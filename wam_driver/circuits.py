@@ -43,7 +43,6 @@ class CableCircuits:
 
     Attributes
     ----------
-    depends_on_torque : True if `follow` has anything to do.
     is_bounded : True if cables end on their pulleys or slip as a whole.
     is_slack : True if a strand is slack and friction depends on the tension.
     each : of each circuit the two slack ends between its strands, creep in a step per speed and torque, and the
@@ -52,13 +51,11 @@ class CableCircuits:
 
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
         n = len(arm.motors.names)
-        friction_counts = effects.slack and any(effects.tension_friction)
         self._capstan = effects.capstan
         self.is_bounded = (effects.creep and effects.terminated) or effects.capstan > 0.0
-        self.depends_on_torque = effects.creep or friction_counts or self.is_bounded
         self.is_slack = False
         self._may_slacken = effects.slack
-        self._friction_counts = friction_counts
+        self._friction_counts = effects.slack and any(effects.tension_friction)
         self._nominal = self._circuits = arm.circuits
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
         self._pulls: Callable[[], list[float]] = data.qfrc_spring[:n].tolist
@@ -130,7 +127,7 @@ class CableCircuits:
         """What has to follow each step; None for nothing."""
         if self.is_bounded:
             return self._follow_bounded
-        return self.follow if self.depends_on_torque else None
+        return self.follow if any(self._losses) or self._friction_counts else None
 
     def _follow_bounded(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """`follow` for cables that end on both pulleys, or slip as a whole at the capstan's limit (6.16)."""

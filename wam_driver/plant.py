@@ -301,7 +301,7 @@ class Plant:
             self._surfaces.laws,
             *friction.bounds,
             friction.direction,
-            circuits.each if circuits.depends_on_torque else [],
+            circuits.each if circuits.after_step else [],
             circuits,
             self._loads.pushes,
             step,
