@@ -125,16 +125,12 @@ class Lockstep:
             self._session.begin()
             self._announce()
         if self._waited >= self._patience:
-            self._stop(self._overdue(missing))
+            self._advice, topics, allowed = self._cause(missing), " and ".join(missing), self._timing.timeout
+            stamp = self._driver.stamp
+            self._stop(fault("unanswered", topics=topics, stamp=stamp, allowed=allowed, cure=self._advice))
             self._patience = 0.5 * DRIVER.watch  # at the next look again
             self.pacer.restart()
             self._one_period()
-
-    def _overdue(self, missing: list[str]) -> Event:
-        """Why time does not go on, and what to do."""
-        self._advice = self._cause(missing)
-        topics, allowed = " and ".join(missing), self._timing.timeout
-        return fault("unanswered", topics=topics, stamp=self._driver.stamp, allowed=allowed, cure=self._advice)
 
     def _cause(self, missing: list[str]) -> str:
         """The node that is the reason, and what to do about it."""
