@@ -186,16 +186,16 @@ class SimulatedBus:
             self._safety |= {"MODE": mode, "PEN": pendant_of(*faulty)}
 
     def _watch(self) -> None:
-        values = self._safety
-        if values["MODE"] != self._mode:
-            self._mode, self._requested, self._pressed = values["MODE"], self.time, self.time
+        values, mode = self._safety, self._safety["MODE"]
+        if mode != self._mode:
+            self._mode, self._requested, self._pressed = mode, self.time, self.time
             for one in self._motors:
-                one.values |= {"MODE": BUS.torque_mode if self._mode == SafetyMode.ACTIVE else BUS.idle_mode, "T": 0}
-                if self._mode == SafetyMode.ESTOP:
+                one.values |= {"MODE": BUS.torque_mode if mode == SafetyMode.ACTIVE else BUS.idle_mode, "T": 0}
+                if mode == SafetyMode.ESTOP:
                     one.values |= {"STAT": 0, "P": 1000 * one.node}  # the zero is lost
                     values["ZERO"] = 0
         is_requested = self.time - self._requested <= BUS.heartbeat
-        if values["MODE"] == SafetyMode.ACTIVE:
+        if mode == SafetyMode.ACTIVE:
             speeds = self._body.start_and_tool_speeds(self._plant.q, self._plant.qd)
             if max(abs(one.values["T"]) for one in self._motors) > values["TL2"]:
                 self.switch(SafetyMode.IDLE, "torque")
@@ -204,7 +204,7 @@ class SimulatedBus:
             elif not is_requested:
                 self.switch(SafetyMode.ESTOP, "heartbeat")
         elif self.is_attended and self.time - self._pressed > BUS.attention:
-            if values["MODE"] == SafetyMode.ESTOP or faults(values["PEN"]):
+            if mode == SafetyMode.ESTOP or faults(values["PEN"]):
                 self.switch(SafetyMode.IDLE)
             elif values["ZERO"] and is_requested:
                 self.switch(SafetyMode.ACTIVE)
