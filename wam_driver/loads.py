@@ -93,11 +93,11 @@ class CoverLoads:
         """End every push."""
         self.pushes.clear()
 
-    def pushes_in_words(self) -> str:
-        """How hard which covers are pushed; '' where none is."""
-        sizes = [(push.force, "N") if any(push.force) else (push.torque, "N m") for push in self.pushes.values()]
-        each = zip(sizes, self.pushes, strict=True)
-        return ", ".join([f"{math.hypot(*size):.4g} {unit} on {cover}" for (size, unit), cover in each])
+    def pushes_in_words(self) -> list[str]:
+        """How hard each cover is pushed that is pushed."""
+        each = self.pushes.items()
+        sizes = {cover: (push.force, "N") if any(push.force) else (push.torque, "N m") for cover, push in each}
+        return [f"{math.hypot(*size):.4g} {unit} on {cover}" for cover, (size, unit) in sizes.items()]
 
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""

@@ -144,8 +144,6 @@ class Plant:
         data, view, effects, arm = self.data, self._view, self._effects, self._arm
         mujoco.mj_resetData(self.model, data)
         self._circuits.rest()
-        for one in self._moving:
-            one.lead(0.0)
         view.q[:] = arm.joints.start
         view.theta[:] = self._map.motor_from_joint @ view.q
         mujoco.mj_forward(self.model, data)
@@ -160,6 +158,8 @@ class Plant:
     def _begin(self) -> None:
         """Prepare the first step of an arm at rest: braked, its contacts and velocities computed."""
         data = self.data
+        for one in self._moving:
+            one.lead(data.time)
         self._friction.reset()
         self._circuits.reset()
         self._braked = True
@@ -196,8 +196,6 @@ class Plant:
         mujoco.mj_resetData(self.model, self.data)
         self._view.position[:], self._view.plastic[:] = self._kept
         self.data.time = time
-        for one in self._moving:
-            one.lead(time)
         self._begin()
 
     def brake(self, on: bool) -> None:
@@ -227,7 +225,7 @@ class Plant:
     def pushes_in_words(self) -> str:
         """How hard which covers are pushed, by whom if a pusher does; '' where none is."""
         pressing = [pusher.words for pusher in self._pushers if pusher.is_pressing]
-        return ", ".join([self._loads.pushes_in_words(), *pressing] if self._loads.pushes else pressing)
+        return ", ".join([*self._loads.pushes_in_words(), *pressing])
 
     def carry(self, mass: float) -> None:
         """Carry a mass at the tool, kg, from now on, besides `arm.payload`: a point that already moves with it."""
