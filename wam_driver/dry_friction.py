@@ -76,13 +76,17 @@ class DryFriction:
 
     def reset(self) -> None:
         """Return to power-up: every shaft is stuck, none is displaced."""
-        self.direction[:] = [0] * len(self._shafts)
-        for end, limits in enumerate(self.bounds):
-            limits[:] = [bounds[0][end] for bounds in self._bounds]
-        self.levels = self._static.copy()
+        for i in self._shafts:
+            self._set_direction(i, 0)
         for presliding in self._presliding.values():
             presliding.torque = 0.0
         self.elastic = [0.0] * len(self._shafts) if self._presliding else []
+
+    def _set_direction(self, i: int, way: int) -> None:
+        """Let a shaft be stuck, 0, or move in the direction of a sign."""
+        self.direction[i] = way
+        self._low[i], self._high[i] = self._bounds[i][way]
+        self.levels[i] = self._dynamic[i] if way else self._static[i]
 
     def set_circuits(self, circuits: Sequence[Circuit]) -> None:
         """Take the pretension of each circuit, (n,), for the friction by tension (6.5)."""
@@ -132,10 +136,8 @@ class DryFriction:
         for i, speed, low, high in zip(self._shafts, velocity, self._low, self._high):  # noqa: B905 - costs 1 % of a step
             if low < speed < high:
                 continue
-            way = 0 if self.direction[i] else 1 if speed > 0.0 else -1  # one that moved is stuck before it turns
-            self.direction[i] = way
-            self._low[i], self._high[i] = self._bounds[i][way]
-            self.levels[i] = self._dynamic[i] if way else self._static[i]
+            # one that moved is stuck before it turns
+            self._set_direction(i, 0 if self.direction[i] else 1 if speed > 0.0 else -1)
             changed = True
         self._evaluate(velocity, load, held)
         return changed or not self.is_steady
