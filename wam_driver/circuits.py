@@ -66,7 +66,7 @@ class CableCircuits:
         # with backlash the ends are those of the play
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
         self._damping = [circuit.damping for circuit in arm.circuits]
-        creeps = effects.creep and not effects.terminated  # by travel alone
+        creeps = effects.creep and not effects.terminated  # those of terminated cables are wound: `_creeps`
         self._losses = [step * circuit.loss_per_torque if creeps else 0.0 for circuit in arm.circuits]
         self.each: list[tuple[int, int, float, float]] = []
         self._prepare()
