@@ -11,3 +11,4 @@ Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Texts = NDArray[np.object_]
 Times = NDArray[np.int64]  # ns
+Waves = NDArray[np.complex128]

@@ -128,15 +128,13 @@ class Piece(NamedTuple):
     time : (n,), s.
     values : (n,) by quantity.
     noise : its standard deviation by quantity.
-    stamps : (m,), s, where these are irregular, else the same as `time`.
-    recorded : (m,) by quantity, the values at the stamps.
+    stamps : (m,), s, where these are irregular, else the same as `time`; between them the values are on straight lines.
     """
 
     time: Numbers
     values: dict[str, Numbers]
     noise: dict[str, float]
     stamps: Numbers
-    recorded: dict[str, Numbers]
 
     @property
     def period(self) -> float:
@@ -478,7 +476,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
         if min(len(time), count) < SHAFT.fewest_samples:
             continue
         values = {q: v[begin:end] for q, v in source.values.items()}
-        stamps, recorded = time, values
+        stamps = time
         if np.max(np.abs(np.diff(time) - period)) > STREAM.irregular * period:
             even = np.linspace(time[0], time[-1], count)
             values = {q: np.interp(even, time, v) for q, v in values.items()}
@@ -487,7 +485,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
         if "position" in values and "velocity" not in values:
             values = dict(values)
             values["velocity"], sd["velocity"] = differentiated(time, values["position"])
-        found.append(Piece(time, values, sd, stamps, recorded))
+        found.append(Piece(time, values, sd, stamps))
     return found
 
 

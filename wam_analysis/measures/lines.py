@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.thresholds import CYCLE
-from wam_bag.arrays import Numbers
+from wam_bag.arrays import Numbers, Waves
 
 
 class SpectralLine(NamedTuple):
@@ -16,7 +16,7 @@ class SpectralLine(NamedTuple):
     amplitude: float
 
 
-def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLine]:
+def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) -> list[SpectralLine]:
     """The strongest lines of a spectrum, and the strongest within two octaves, as of a vibration next to a slow motion.
 
     A line is a maximum of the Hann periodogram that noise does not explain whose power is a power of the frequency
@@ -27,12 +27,14 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     ----------
     time : (n,), s, at a constant rate.
     value : (n,), without NaN.
+    stamps : (m,), s, when the samples were taken between which the values are on straight lines, or `time`.
     most : lines that are returned at most.
     """
     n = len(value)
     if n < CYCLE.window_samples or not np.ptp(value) > 0.0:
         return []
-    amplitude = 4.0 * np.abs(np.fft.rfft(_windowed(time, value)[0])) / n
+    even, flat, window = np.linspace(time[0], time[-1], n), *_windowed(value)
+    amplitude = 4.0 * np.abs(np.fft.rfft(flat)) / n
     power, spacing = amplitude**2, (n - 1) / (n * float(time[-1] - time[0]))
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
@@ -47,23 +49,31 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
         frequency = (k + shift) * spacing
-        found.append(SpectralLine(frequency, amplitude_at(time, value, frequency)))
+        kept = window * kept_between(even, stamps, frequency)
+        part = np.sum(flat * np.exp(-2j * np.pi * frequency * even))
+        found.append(SpectralLine(frequency, 2.0 * float(np.abs(part / np.sum(kept)))))
     return found
 
 
-def amplitude_at(time: Numbers, value: Numbers, frequency: float) -> float:
-    """Amplitude of a signal at a frequency, Hz; the times, (n,), s, rise, and need not be even."""
-    flat, window = _windowed(time, value)
-    turns, width = np.exp(-2j * np.pi * frequency * (time - time[0])), np.gradient(time)
-    return float(2.0 * np.abs(np.sum(flat * turns * width)) / np.sum(window * width))
+def kept_between(time: Numbers, stamps: Numbers, frequency: float) -> Waves:
+    """What straight lines between samples keep of a wave at some times, (n,): its mean is 1 where they keep all.
+
+    Parameters
+    ----------
+    time : (n,), s.
+    stamps : of the samples, (m,), s.
+    frequency : Hz.
+    """
+    wave = np.exp(2j * np.pi * frequency * stamps)
+    return np.asarray(np.interp(time, stamps, wave) * np.exp(-2j * np.pi * frequency * time))
 
 
-def _windowed(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
-    """A signal less its line, in a Hann window, and this window, whose mean is a half."""
+def _windowed(value: Numbers) -> tuple[Numbers, Numbers]:
+    """A signal at a constant rate less its line, in a Hann window, and this window, whose mean is a half."""
     n = len(value)
-    steps = (time - time[0]) / (time[-1] - time[0])
+    steps = np.linspace(0.0, 1.0, n)
     flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (steps * (n - 1) + 0.5) / n)
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n)
     return flat * window, window
 
 
