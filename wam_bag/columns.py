@@ -233,6 +233,8 @@ def joint_names(names: Sequence[str], width: int) -> tuple[str, ...]:
 def irregularities(names: Sequence[str], widths: Mapping[str, int]) -> Iterator[str]:
     """What is wrong with the names of a message and the lengths of its fields."""
     most = max(len(names), *widths.values())
+    if not any(widths.values()):
+        yield "no value"
     if not all(names) or len(names) < most:
         yield UNNAMED
     if len(set(filter(None, names))) < len([*filter(None, names)]):

@@ -199,6 +199,8 @@ def names() -> list[Case]:
         Case("one of two", sqlite, called("x"), numbers("x", "joint2"), "without a name"),
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
+        Case("nothing now and then", ros1, without(called("x", "y"), lambda i: i % 9 == 4, "position"),
+             numbers("x", "y"), "messages with no value"),
     ]  # fmt: skip
 
 
