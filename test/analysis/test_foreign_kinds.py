@@ -136,6 +136,7 @@ def coarse() -> list[Case]:
         ("never set", by_mcap_ros2, 50.0, lambda t: -1.7e9),
         ("the first from before", sqlite, 100.0, lambda t: t - 3600.0 * (t == 0.0) + 1e-6 * math.sin(9.0 * t)),
         ("milliseconds", by_mcap_ros2, 400.0, lambda t: round(t, 3)),
+        ("parts of a float", by_mcap_ros2, 125.0, lambda t: math.floor(2048.0 * t) / 2048.0),
         ("set forward", sqlite, 100.0, lambda t: t + 0.4 * (t > 11.0)),
     ]
     return [

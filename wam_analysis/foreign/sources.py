@@ -213,7 +213,7 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
     again *= 2 * np.sum(changed) < np.sum(~same)  # they are no copies where nothing moves
     is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
-    quantum = int(np.gcd.reduce(steps))
+    quantum = _quantum(steps)
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
     fine = STREAM.irregular * period
@@ -230,6 +230,14 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
         left_out = of - int(np.sum(kept))
         return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
     return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", size=quantum / 1e9),))
+
+
+def _quantum(steps: Times) -> int:
+    """To what stamps are rounded, ns: what all steps from one to another are multiples of; 0 if there is no such."""
+    lengths = np.unique(steps)
+    quantum = min((one for one in np.diff(lengths).tolist() if one > STREAM.exact), default=0)
+    parts = lengths / max(quantum, 1)
+    return quantum * bool(np.all(np.abs(parts - np.rint(parts)) < STREAM.irregular))
 
 
 def clocks_of(bag: Bag) -> dict[str, Clock]:
