@@ -25,7 +25,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
     states = recording.states
     sentences, findings, brief, alone = [], [], [], []
     doubts, wrong = list[str](), list[str]()
-    for one in (one for one in states if one.is_joint):
+    for one in (one for one in states if one.is_joint and not rests(one)):
         unlike = contradiction(one) or _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
         found, lag = (Friction(), 0.0) if unlike else friction(one)
@@ -36,7 +36,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            if not unlike and np.any(one.values.get("effort", 0.0)) and len(one.values) > 1 and not rests(one):
+            if not unlike and np.any(one.values.get("effort", 0.0)) and len(one.values) > 1:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue
@@ -101,11 +101,8 @@ def _limited(source: Source) -> str:
 
 
 def contradiction(source: Source) -> str:
-    """How the recorded velocity is not the rate of the position, '' where the two agree.
-
-    A joint whose encoder only flickers does not move.
-    """
-    if not {"position", "velocity"} <= source.values.keys() or rests(source):
+    """How the recorded velocity is not the rate of the position, '' where the two agree."""
+    if not {"position", "velocity"} <= source.values.keys():
         return ""
     factor = source.velocity_factor
     if abs(factor - 1.0) > SHAFT.agree:
