@@ -230,7 +230,7 @@ class StreamThresholds:
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
-    exact: int = 1000  # ns: two waits that differ by less are one, in numbers with the digits of a float
+    exact: int = 1000  # ns: waits that differ by less are one
     steps: int = 64  # from stamp to stamp, from which a rate is known
     changes: float = 1.5  # periods: a step that is longer lacks a message, and a period that is longer is another one
     relayed: float = 0.6  # of the messages: so many change at most where each comes again

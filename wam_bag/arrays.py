@@ -11,4 +11,3 @@ Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Texts = NDArray[np.object_]
 Times = NDArray[np.int64]  # ns
-Waves = NDArray[np.complex128]

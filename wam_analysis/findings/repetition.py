@@ -9,9 +9,9 @@ import numpy as np
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Piece, Source, pieces
 from wam_analysis.held_messages import row_at
-from wam_analysis.measures.episodes import Episode, episodes
-from wam_analysis.measures.limit_cycle import limit_cycle
-from wam_analysis.measures.lines import kept_between, spectral_lines
+from wam_analysis.measures.episodes import Episode, episodes, without_drift
+from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
+from wam_analysis.measures.lines import spectral_lines
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
@@ -123,7 +123,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
     """The cycles of a stretch."""
     result: list[FoundCycle] = []
     rest = None if command is None else _without_response(piece, quantity, command)
-    for one in _found(piece, piece.values[quantity], least):
+    for one in _found(piece, quantity, piece.values[quantity], least):
         frequency = _commanded_frequency(one, quantity, command)
         if frequency is None:
             result.append(FoundCycle(one, UNKNOWN))
@@ -135,7 +135,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
     if rest is None or command is None:
         return result
     rate = 1.0 / max(float(np.median(np.diff(command.time))), STREAM.quickest) if len(command.time) > 1 else 0.0
-    for one in _found(piece, rest, least):
+    for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_frequency:
             continue  # the commanded motion itself, which it does not follow linearly, or the steps of its messages
@@ -146,12 +146,21 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
     return result
 
 
-def _found(piece: Piece, value: Numbers, least: float) -> Iterator[Episode]:
-    """Episodes of a signal of a piece, with what straight lines between irregular samples cut off."""
+def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterator[Episode]:
+    """Episodes of a signal of a piece; where the stamps are irregular, their sizes are those of the recorded values."""
     for one in episodes(piece.time, value, least):
-        inside = (piece.time >= one.begin) & (piece.time <= one.end)
-        kept = np.mean(kept_between(piece.time[inside], piece.stamps, 1.0 / one.cycle.period))
-        yield one._replace(cycle=one.cycle._replace(peak_to_peak=one.cycle.peak_to_peak / float(np.abs(kept))))
+        if piece.stamps is not piece.time:
+            period = one.cycle.period
+            first, last = (
+                CYCLE.edge * period * (at not in (piece.time[0], piece.time[-1])) for at in (one.begin, one.end)
+            )
+            inner = (piece.stamps >= one.begin + first) & (piece.stamps <= one.end - last)
+            drift = piece.values[quantity] - without_drift(piece.time, value, period)
+            stamps = piece.stamps[inner]
+            level = piece.recorded[quantity][inner] - np.interp(stamps, piece.time, drift)
+            yield one._replace(cycle=one.cycle._replace(peak_to_peak=size_of_cycle(stamps, level, period)))
+        else:
+            yield one
 
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:

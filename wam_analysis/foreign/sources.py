@@ -128,13 +128,15 @@ class Piece(NamedTuple):
     time : (n,), s.
     values : (n,) by quantity.
     noise : its standard deviation by quantity.
-    stamps : (m,), s, where these are irregular, else the same as `time`; between them the values are on straight lines.
+    stamps : (m,), s, where these are irregular, else the same as `time`.
+    recorded : (m,) by quantity, the values at the stamps.
     """
 
     time: Numbers
     values: dict[str, Numbers]
     noise: dict[str, float]
     stamps: Numbers
+    recorded: dict[str, Numbers]
 
     @property
     def period(self) -> float:
@@ -233,7 +235,7 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
 
 
 def _quantum(steps: Times) -> int:
-    """To what stamps are rounded, ns: what all steps from one to another are multiples of; 0 if there is no such."""
+    """To what stamps are rounded, ns: all steps are multiples of it; 0 if none is."""
     lengths = np.unique(steps)
     quantum = min((one for one in np.diff(lengths).tolist() if one > STREAM.exact), default=0)
     parts = lengths / max(quantum, 1)
@@ -484,7 +486,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
         if min(len(time), count) < SHAFT.fewest_samples:
             continue
         values = {q: v[begin:end] for q, v in source.values.items()}
-        stamps = time
+        stamps, recorded = time, values
         if np.max(np.abs(np.diff(time) - period)) > STREAM.irregular * period:
             even = np.linspace(time[0], time[-1], count)
             values = {q: np.interp(even, time, v) for q, v in values.items()}
@@ -493,7 +495,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
         if "position" in values and "velocity" not in values:
             values = dict(values)
             values["velocity"], sd["velocity"] = differentiated(time, values["position"])
-        found.append(Piece(time, values, sd, stamps))
+        found.append(Piece(time, values, sd, stamps, recorded))
     return found
 
 

@@ -85,6 +85,19 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     )
 
 
+def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
+    """Peak to peak of the mean cycle of a known period, at any times: irregular ones fill every phase.
+
+    Parameters
+    ----------
+    time : (n,), s.
+    value : (n,), the signal without drift.
+    period : s.
+    """
+    phases = max(min(CYCLE.phases, len(value) // CYCLE.phase_samples), 2)
+    return _fold(value - np.mean(value), time / period % 1.0, phases).size
+
+
 class CycleExtent(NamedTuple):
     """Peak to peak, in the unit of the signal, and period, s, of a cycle; NaN if there is none."""
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.thresholds import CYCLE
-from wam_bag.arrays import Numbers, Waves
+from wam_bag.arrays import Numbers
 
 
 class SpectralLine(NamedTuple):
@@ -49,23 +49,10 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) ->
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
         frequency = (k + shift) * spacing
-        kept = window * kept_between(even, stamps, frequency)
-        part = np.sum(flat * np.exp(-2j * np.pi * frequency * even))
-        found.append(SpectralLine(frequency, 2.0 * float(np.abs(part / np.sum(kept)))))
+        back = np.exp(-2j * np.pi * frequency * even)
+        kept = np.interp(even, stamps, np.exp(2j * np.pi * frequency * stamps))
+        found.append(SpectralLine(frequency, 2.0 * float(np.abs(np.sum(flat * back) / np.sum(window * kept * back)))))
     return found
-
-
-def kept_between(time: Numbers, stamps: Numbers, frequency: float) -> Waves:
-    """What straight lines between samples keep of a wave at some times, (n,): its mean is 1 where they keep all.
-
-    Parameters
-    ----------
-    time : (n,), s.
-    stamps : of the samples, (m,), s.
-    frequency : Hz.
-    """
-    wave = np.exp(2j * np.pi * frequency * stamps)
-    return np.asarray(np.interp(time, stamps, wave) * np.exp(-2j * np.pi * frequency * time))
 
 
 def _windowed(value: Numbers) -> tuple[Numbers, Numbers]:
