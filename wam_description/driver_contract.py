@@ -5,8 +5,6 @@
 
 from typing import Final, NamedTuple
 
-from wam_description.arm import Shared
-
 STOP: Final = 0.050  # s of the arm's time, from the newest state that was answered to zero current
 STATUS_AGE: Final = 0.25  # s, between two repetitions of the status
 REPLY: Final = 0.5  # s of the wall clock, for the driver to act on a service or on a status
@@ -129,32 +127,3 @@ REQUIREMENTS: Final = {
         "take the session from the wall clock in ms at the start",
     ),
 }  # fmt: skip
-
-
-class DriverContract(NamedTuple):
-    """The numbers of the contract on one arm.
-
-    Attributes
-    ----------
-    motors : names.
-    period, outer_period : ns.
-    torque_constant : N m/A each; 1 on an arm that is commanded torques.
-    peak : A each.
-    least_share : of the periods in which a state comes.
-    """
-
-    motors: tuple[str, ...]
-    period: int
-    outer_period: int
-    torque_constant: tuple[float, ...]
-    peak: tuple[float, ...]
-    least_share: float
-
-    @classmethod
-    def of(cls, shared: Shared, least_share: float) -> "DriverContract":
-        """The contract of a configuration."""
-        motors, timing = shared.arm.motors, shared.timing
-        peak = tuple(t / k for t, k in zip(motors.peak_torque, motors.torque_constant, strict=True))
-        return cls(
-            tuple(motors.names), timing.period_ns, timing.outer_period_ns, motors.torque_constant, peak, least_share
-        )

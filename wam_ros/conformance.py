@@ -37,13 +37,13 @@ def _interface(bench: DriverBench) -> str:
 def _rate(bench: DriverBench) -> str:
     bench.forget()
     bench.watch(2 * CONFORMANCE_LIMITS.look)
-    states, period = bench.states(), bench.contract.period
+    states, period = bench.states(), bench.shared.timing.period_ns
     elapsed = states[-1].when - states[0].when
     advanced = (states[-1].stamp - states[0].stamp) * 1e-9
     if abs(advanced / elapsed - 1.0) > CONFORMANCE_LIMITS.period_error:
         return f"stamps advance by {advanced:.3f} s in {elapsed:.3f} s"
     share = len(states) * period * 1e-9 / elapsed
-    if not bench.contract.least_share <= share <= 1.0 + 2 * CONFORMANCE_LIMITS.period_error:
+    if not bench.least_share <= share <= 1.0 + 2 * CONFORMANCE_LIMITS.period_error:
         busy, cores = os.getloadavg()[0], os.cpu_count() or 1
         why = f"; {busy:.0f} processes compete for the {cores} processors of this machine" if busy > cores else ""
         return f"{len(states)} states in {elapsed:.2f} s, {share:.0%} of the periods{why}"
@@ -56,22 +56,22 @@ def _stamps(bench: DriverBench) -> str:
     for before, stamp in pairwise(stamps):
         if stamp <= before:
             return f"after {before} ns comes {stamp} ns"
-    wrong = next((stamp for stamp in stamps if stamp <= 0 or stamp % bench.contract.period), None)
-    return f"{wrong} ns is no multiple of {bench.contract.period} ns" if wrong is not None else ""
+    wrong = next((stamp for stamp in stamps if stamp <= 0 or stamp % bench.shared.timing.period_ns), None)
+    return f"{wrong} ns is no multiple of {bench.shared.timing.period_ns} ns" if wrong is not None else ""
 
 
 def _outer(bench: DriverBench) -> str:
     bench.forget()
     bench.watch(CONFORMANCE_LIMITS.look)
     states = {state.stamp for state in bench.states()}
-    period, outer = bench.contract.period, bench.contract.outer_period
-    due = sum((stamp - period) % outer == 0 for stamp in states)
+    is_outer = bench.shared.timing.is_outer
+    due = sum(map(is_outer, states))
     for topic in ("motor_currents", "/clock"):
         stamps = {one.stamp for one in bench.arrived[topic]}
-        strange = sorted(stamp for stamp in stamps if (stamp - period) % outer)
+        strange = sorted(stamp for stamp in stamps if not is_outer(stamp))
         if strange:
             return f"{topic} has the stamp {strange[0]} ns, which begins no outer period"
-        if len(stamps & states) < bench.contract.least_share * due - 2:
+        if len(stamps & states) < bench.least_share * due - 2:
             return f"{topic} came {len(stamps)} times in {due} outer periods"
     return ""
 
@@ -90,7 +90,7 @@ def _velocity(bench: DriverBench) -> str:
     position, velocity, _ = (np.array(values) for values in zip(*(one.value for one in states), strict=True))
     times, steps = np.array([one.stamp for one in states]) * 1e-9, np.diff(position, axis=0)
     integrals = np.diff(times) @ (velocity[1:] + velocity[:-1]) / 2.0
-    for name, step, integral in zip(bench.contract.motors, steps.T, integrals, strict=True):
+    for name, step, integral in zip(bench.motors.names, steps.T, integrals, strict=True):
         moved, travelled = step.sum(), abs(step).sum()
         finest = abs(step[step != 0.0]).min(initial=math.inf)  # step of the encoder, rad
         if travelled < CONFORMANCE_LIMITS.least_travel:
@@ -143,13 +143,13 @@ _current = DriverBench.compare
 
 
 def _names(bench: DriverBench) -> str:
-    names = list(bench.contract.motors)[::-1]
+    names = list(bench.motors.names)[::-1]
     bench.wanted = lambda stamp, currents: joint_state(stamp, names, State([], [], currents[::-1]))
     return bench.compare()
 
 
 def _refusals(bench: DriverBench) -> str:
-    names, bad = list(bench.contract.motors), bench.bad()
+    names, bad = list(bench.motors.names), bench.bad()
 
     def made(names: list[str], values: list[float]) -> Callable[[int], object]:
         return lambda stamp: joint_state(stamp, names, State([], [], values))
@@ -167,7 +167,7 @@ def _refusals(bench: DriverBench) -> str:
 
 
 def _answers(bench: DriverBench) -> str:
-    bad, ahead = bench.bad(), 10 * bench.contract.outer_period
+    bad, ahead = bench.bad(), 10 * bench.shared.timing.outer_period_ns
     return bench.bears(
         {
             "no stamp": lambda _: bench.command(0, bad),
@@ -213,7 +213,7 @@ def _at_once(bench: DriverBench, service: str, switch: bool | None, mode: str) -
     last = bench.states()[-1].stamp
     if not done:
         return f"{service} is refused: '{text}'"
-    return bench.stops(last, 1e-9 * bench.contract.outer_period) or bench.in_mode(mode)
+    return bench.stops(last, 1e-9 * bench.shared.timing.outer_period_ns) or bench.in_mode(mode)
 
 
 _disable = partial(_at_once, service="enable", switch=False, mode="braked")

@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from wam_description.agreement import DIGESTS, digests
 from wam_description.arm import Shared
-from wam_description.driver_contract import REPLY, SENT, SERVICES, TAKEN, DriverContract
+from wam_description.driver_contract import REPLY, SENT, SERVICES, TAKEN
 from wam_description.event import Level
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State
@@ -66,6 +66,8 @@ class DriverBench(StackClient):
     is_answering : whether states are answered.
     after : messages that are sent after the next answers, made from the stamp of the state.
     wanted : makes the answer from stamp and currents; None for the proper one.
+    motors : of the arm; the torque constant is 1 N m/A on one that is commanded torques.
+    least_share : as `share`.
     longest_pause : s, in which this node itself did not run.
     end, restart : end the driver as SIGTERM does and start it again; None where it is not ours to end.
     """
@@ -77,11 +79,11 @@ class DriverBench(StackClient):
         self, shared: Shared, share: float, current: float, namespace: str = NAMESPACE, connection: Any = None
     ) -> None:
         super().__init__(namespace, "velocity_loop", connection, shared)
-        self.contract = DriverContract.of(shared, share)
+        self.motors, self.least_share = shared.arm.motors, share
         self._current = current
         self.digests = digests(shared)
         self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
-        self.carrying = [0.0] * len(self.contract.motors)
+        self.carrying = [0.0] * len(self.motors.names)
         self.commanded = list(self.carrying)
         self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in (*KEPT, CLOCK)}
         self.reported: deque[tuple[float, NodeStatus]] = deque(maxlen=CONFORMANCE_LIMITS.kept)
@@ -105,11 +107,11 @@ class DriverBench(StackClient):
         self._refused = f"{topic}: {reason}"
 
     def _answer(self, stamp: int, state: State) -> None:
-        tick = stamp // self.contract.period
+        tick = stamp // self.shared.timing.period_ns
         if tick % self.shared.timing.outer_divisor == 0:
             q = self._map.joint_positions(state.position)
             torque = self._map.motor_torques(self._body.gravity_torque(q).tolist())
-            self.carrying = [t / k for t, k in zip(torque, self.contract.torque_constant, strict=True)]
+            self.carrying = [t / k for t, k in zip(torque, self.motors.torque_constant, strict=True)]
         self.commanded = list(self.carrying)
         self.commanded[0] += self._current if tick // CONFORMANCE_LIMITS.swing % 2 else -self._current
         make, publisher = self.wanted or self.command, self.publisher(COMMAND)
@@ -120,7 +122,7 @@ class DriverBench(StackClient):
 
     def command(self, stamp: int, currents: list[float]) -> Any:
         """A proper command."""
-        return joint_state(stamp, self.contract.motors, State([], [], currents))
+        return joint_state(stamp, self.motors.names, State([], [], currents))
 
     def take_status(self, status: NodeStatus) -> None:
         """Keep a status of the driver, and follow its session."""
@@ -251,7 +253,7 @@ class DriverBench(StackClient):
 
     def flow(self, state: Arrived) -> list[float]:
         """Currents by the effort of a state, A."""
-        return [t / k for t, k in zip(state.value.effort, self.contract.torque_constant, strict=True)]
+        return [t / k for t, k in zip(state.value.effort, self.motors.torque_constant, strict=True)]
 
     @staticmethod
     def tolerance(current: float, peak: float) -> float:
@@ -263,7 +265,7 @@ class DriverBench(StackClient):
         stamps = (
             state.stamp
             for state in self.states()
-            for flow, peak in zip(self.flow(state), self.contract.peak, strict=True)
+            for flow, peak in zip(self.flow(state), self.motors.peak_current, strict=True)
             if abs(flow) > self.tolerance(0.0, peak)
         )
         return max(stamps, default=0)
@@ -272,7 +274,7 @@ class DriverBench(StackClient):
         """What is wrong with how the current stops, counted from a stamp, ns, that was the last good one."""
         self.watch(REPLY)
         late = (self.last_flow() - after) * 1e-9
-        if late > limit + 1e-9 * self.contract.outer_period:
+        if late > limit + 1e-9 * self.shared.timing.outer_period_ns:
             return f"current still flows {late * 1e3:.0f} ms later; allowed: {limit * 1e3:.0f} ms"
         return ""
 
@@ -284,9 +286,9 @@ class DriverBench(StackClient):
 
     def compare(self) -> str:
         """What is wrong with the currents that flow, against those commanded."""
-        contract, looks = self.contract, 20
+        motors, looks = self.motors, 20
         self.enable()
-        wrong = [0] * len(contract.motors)  # looks at each motor
+        wrong = [0] * len(motors.names)  # looks at each motor
         for _ in range(looks):
             self.watch(0.01)
             if not (self.arrived["motor_states"] and self.arrived["motor_currents"]):
@@ -295,20 +297,20 @@ class DriverBench(StackClient):
             sent = self.arrived["motor_currents"][-1].value.effort
             for i, wanted in enumerate(self.commanded):
                 worst = max(abs(flow[i] - wanted), abs(sent[i] - wanted))
-                wrong[i] += worst > self.tolerance(wanted, contract.peak[i])
+                wrong[i] += worst > self.tolerance(wanted, motors.peak_current[i])
         if self.status.mode != "enabled":
             return f"it does not stay enabled: {self.status.message}"
         if 2 * max(wrong) < looks:
             return ""
         i = wrong.index(max(wrong))
         return (
-            f"{contract.motors[i]}: commanded {self.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
-            f"effort of motor_states is {flow[i] * contract.torque_constant[i]:.3g} N m"
+            f"{motors.names[i]}: commanded {self.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
+            f"effort of motor_states is {flow[i] * motors.torque_constant[i]:.3g} N m"
         )
 
     def bad(self) -> list[float]:
         """Currents that may not flow, A: of the other sign than those that hold the arm up, so that the two differ."""
-        pairs = zip(self.contract.peak, self.carrying, strict=True)
+        pairs = zip(self.motors.peak_current, self.carrying, strict=True)
         return [-math.copysign(CONFORMANCE_LIMITS.bad_current * peak, carrying) for peak, carrying in pairs]
 
     def bears(self, messages: dict[str, Callable[[int], object]]) -> str:
@@ -322,7 +324,7 @@ class DriverBench(StackClient):
             for state in self.states():
                 for i, flow in enumerate(self.flow(state)):
                     if flow * bad[i] > 0.7 * bad[i] ** 2:
-                        return f"{what}: its {flow:.3g} A reached {self.contract.motors[i]}"
+                        return f"{what}: its {flow:.3g} A reached {self.motors.names[i]}"
             if self.status.mode != "enabled":
                 return f"{what}: the driver does not stay enabled: {self.status.message}"
         return ""

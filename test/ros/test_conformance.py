@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState
 from wam_cli.commands.conform import driver_alone, on_bus
 from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
-from wam_description.driver_contract import REQUIREMENTS, DriverContract
+from wam_description.driver_contract import REQUIREMENTS
 from wam_description.event import Event, Level
 from wam_description.signals import Answer, State
 from wam_driver.bus.safety_module import SafetyMode
@@ -182,9 +182,8 @@ def test_the_skeleton_keeps_the_contract(ros: Network, tmp_path: Path, monkeypat
 
 
 def test_commanded_torques_are_currents_of_an_arm_with_a_torque_constant_of_one() -> None:
-    configuration = simulated().with_values({"arm.motors.torque_constant": [1.0] * 4})
-    contract = DriverContract.of(configuration.shared, SHARE)
-    assert contract.peak == configuration.shared.arm.motors.peak_torque
+    motors = simulated().with_values({"arm.motors.torque_constant": [1.0] * 4}).shared.arm.motors
+    assert motors.peak_current == motors.peak_torque
 
 
 def test_without_a_driver_no_row_but_the_interface_is_tested(
