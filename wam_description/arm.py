@@ -117,34 +117,27 @@ class Arm:
     def _require_joined(self) -> None:
         """Refuse covers that do not end where the kinematics have the next joint, or the tool."""
         joints, links = rows(self.joints), self.links.names
+        following = (*self.joints.places[1:], self.tool)
         for cover in rows(self.covers):
-            x = _turned_x(cover.rotation)
-            ends = [start + cover.length * along for start, along in zip(cover.origin, x, strict=True)]
-            link = links.index(cover.link)
-            coupled = f"; to change the length of {cover.name}, change arm.covers.length and end, {{}}, "
-            coupled += "and arm.links.mass, centre, inertia"
+            x, link = np.array(_turned_x(cover.rotation)), links.index(cover.link)
+            end = cover.origin + cover.length * x
+            beyond = end - following[link]
+            along = float(beyond @ x)
+            across = math.dist(beyond, along * x)
+            here = what = "arm.tool"
             if link + 1 < len(links):
-                following = joints[link + 1]
-                twist, offset, name = following.twist, following.offset, following.name
-                joint = (following.length, -math.sin(twist) * offset, math.cos(twist) * offset)
-                here = f"arm.joints.offset and length of {name}, arm.covers.origin"
-                where = f"{name} is at {_point(joint)} m"
-                beyond = [end - there for end, there in zip(ends, joint, strict=True)]
-                along = sum(a * b for a, b in zip(beyond, x, strict=True))
-                across = math.sqrt(max(0.0, sum(a * a for a in beyond) - along * along))
+                what = joints[link + 1].name
+                here = f"arm.joints.offset and length of {what}, arm.covers.origin"
                 across = max(0.0, across - cover.radius)  # the axis of a joint may cross the tube anywhere
                 apart = math.hypot(along, across)
             else:
-                here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
-                beyond = [end - tool for end, tool in zip(ends, self.tool, strict=True)]
-                short = sum(a * b for a, b in zip(beyond, x, strict=True))
-                is_on_axis = math.dist(beyond, [short * along for along in x]) <= MODEL.same_point
-                apart = max(0.0, short) if is_on_axis else 0.0  # a tool may be beyond the link or next to it
+                apart = max(0.0, along) if across <= MODEL.same_point else 0.0  # a tool may be beyond or next to it
+            coupled = f"; to change the length of {cover.name}, change arm.covers.length and end, {{}}, "
+            coupled += "and arm.links.mass, centre, inertia"
             require(
                 apart <= MODEL.same_point,
-                f"{cover.name} ends at {_point(ends)} m in the frame of {cover.link}, by arm.covers.length, but "
-                + where
-                + coupled.format(here),
+                f"{cover.name} ends at {_point(end)} m in the frame of {cover.link}, by arm.covers.length, but "
+                f"{what} is at {_point(following[link])} m" + coupled.format(here),
             )
             own = joints[link]
             before = (-own.length, 0.0, -own.offset)  # the joint before, in this link's frame

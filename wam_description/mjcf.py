@@ -129,10 +129,8 @@ def _add_rotors(world: Element, motors: Motors) -> None:
 
 def _add_links(world: Element, arm: Arm, folding: Folding) -> None:
     parent = world
-    for link, joint in zip(rows(arm.carried), rows(arm.joints), strict=True):
-        twist = joint.twist
-        position = (joint.length, -math.sin(twist) * joint.offset, math.cos(twist) * joint.offset)
-        parent = add(parent, "body", name=link.name, pos=position, euler=(twist, 0.0, 0.0))
+    for link, joint, place in zip(rows(arm.carried), rows(arm.joints), arm.joints.places, strict=True):
+        parent = add(parent, "body", name=link.name, pos=place, euler=(joint.twist, 0.0, 0.0))
         inertia = {"fullinertia": link.inertia + link.product} if any(link.product) else {"diaginertia": link.inertia}
         add(parent, "inertial", pos=link.centre, mass=link.mass, **inertia)
         add(

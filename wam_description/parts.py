@@ -1,5 +1,6 @@
 """The moving parts of an arm as parameters: motors, joints and links, each in the order of the `names` of its group."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -64,6 +65,12 @@ class Joints:
         for name, low, start, high in zip(self.names, self.lower, self.start, self.upper, strict=True):
             require(low < high, f"{name}: arm.joints.lower {low:g} rad is not below upper {high:g} rad")
             require(low <= start <= high, f"{name}: arm.joints.start {start:g} rad is outside {low:g} to {high:g} rad")
+
+    @property
+    def places(self) -> list[tuple[float, float, float]]:
+        """Origin of the frame of each joint in that of the one before it, x y z, m."""
+        shapes = zip(self.twist, self.length, self.offset, strict=True)
+        return [(length, -math.sin(twist) * offset, math.cos(twist) * offset) for twist, length, offset in shapes]
 
     def beyond(self, posture: Sequence[float]) -> str:
         """Why a posture (n,), rad, is refused: the first joint beyond its stops; '' where none is."""
