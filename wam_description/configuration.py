@@ -146,22 +146,19 @@ class Configuration(NamedTuple):
             if the configuration has no such parameter, or a new section is of no node.
         """
         path = path or self.path
-        new = {name: dict(flat) for name, flat in changes.items() if name not in self.sections}
-        sections = {**new, **{name: dict(flat) for name, flat in self.sections.items()}}
-        whole = Configuration(path, _frozen(sections))
-        listed = changes.get(SHARED, {}).get("nodes", self.sections[SHARED].get("nodes", []))
+        new = {name: flat for name, flat in changes.items() if name not in self.sections}
+        sections = {**new, **self.sections}
+        listed = list(map(str, changes.get(SHARED, {}).get("nodes", self.sections[SHARED].get("nodes", []))))
+        has_own = any(":" in entry for entry in listed)  # whose name is known once it is imported
         for name in new:
-            if not any(_may_be(str(entry), name) for entry in listed):
+            if not (has_own or name in listed):
                 known = ", ".join(section for section in self.sections if section != SHARED)
                 raise ParameterError(
                     f"{path}: section '{SHARED}/{name}' belongs to no node in 'nodes'; sections of the {BASE}: {known}"
                 )
-        if any(":" in str(entry) for entry in listed):  # a node of one's own may have more parameters
-            for name, flat in changes.items():
-                if name != SHARED:
-                    sections[name] = {**flat, **sections[name]}
-            whole = Configuration(path, _frozen(sections))
-        return whole.with_values(
+        if has_own:  # it may have more parameters than a node of the base
+            sections |= {name: {**flat, **sections[name]} for name, flat in changes.items() if name != SHARED}
+        return Configuration(path, _frozen(sections)).with_values(
             {
                 key if name == SHARED else f"{name}:{key}": value
                 for name, flat in changes.items()
@@ -334,11 +331,6 @@ def shaped_like(present: Any, value: Any) -> Any:
     if isinstance(present, list | tuple) and isinstance(value, int | float) and not isinstance(value, bool):
         return [value] * max(len(present), 1)
     return listed(value)
-
-
-def _may_be(entry: str, name: str) -> bool:
-    """Whether an entry of 'nodes' can be the node of a name; that of a 'module:Class' is known once it is imported."""
-    return entry == name or ":" in entry
 
 
 def _chain(path: Path, above: tuple[Path, ...] = ()) -> list[tuple[Path, Any]]:

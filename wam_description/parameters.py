@@ -228,7 +228,7 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         parts += [f"unknown parameter '{name}'" for name in unknown]
         parts += ["docs/parameters.md lists what there is"] * cls.__module__.startswith("wam_")
         raise ParameterError("; ".join(parts))
-    return _assemble(cls, {name: checked(field, flat[name]) for name, field in known.items()}, "")
+    return _assemble(cls, nested({name: checked(field, flat[name]) for name, field in known.items()}))
 
 
 def _defaults(known: Iterable[Field], flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -257,17 +257,11 @@ def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
     return build(cls, {key: value for key, value in flat.items() if key in known})
 
 
-def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
+def _assemble(cls: type[T], tree: Mapping[str, Any]) -> T:
     hints = _hints(cls)
-    arguments: dict[str, Any] = {}
-    for item in dataclasses.fields(cls):  # type: ignore[arg-type]
-        hint = hints[item.name]
-        if dataclasses.is_dataclass(hint):
-            assert isinstance(hint, type)
-            arguments[item.name] = _assemble(hint, flat, f"{prefix}{item.name}.")
-        else:
-            arguments[item.name] = flat[prefix + item.name]
-    return cls(**arguments)
+    return cls(
+        **{key: _assemble(hints[key], value) if isinstance(value, dict) else value for key, value in tree.items()}
+    )
 
 
 def checked(field: Field, value: Any) -> Value:
