@@ -151,17 +151,14 @@ class Interface:
     ) -> None:
 
         self._timing, self._ages, self._arm = shared.timing, shared.ages, shared.arm
-        found = [declared(entry) for entry in shared.nodes]
-        replaced = dict(replaced or {})
         self.declarations: dict[str, Declaration] = {}
-        for one in found:
+        for one in map(declared, shared.nodes):
             if one.name in self.declarations:
                 raise ParameterError(
                     f"two nodes of the configuration are named '{one.name}'; list one of them, or rename your own"
                 )
-            node = replaced.pop(one.name, None)
-            self.declarations[one.name] = one if node is None else declaration(node)._replace(name=one.name)
-        for name, node in replaced.items():
+            self.declarations[one.name] = one
+        for name, node in (replaced or {}).items():
             self.declarations[name] = declaration(node)._replace(name=name)
         known = [*self.declarations.values(), *([started_by_hand] if started_by_hand else [])]
         every = {**{topic.name: topic for one in known for topic in one.topics}, **BY_NAME}
@@ -183,11 +180,8 @@ class Interface:
 
     def subscribers(self, topic: str) -> list[str]:
         """Names of the nodes that take a topic; the recorder takes every one, and every node the driver's status."""
-
-        def takes(name: str, one: Declaration) -> bool:
-            return topic in one.inputs or topic == STATUS or name == "recorder"
-
-        return [name for name, one in self.declarations.items() if takes(name, one)]
+        takers = self.declarations.items()
+        return [name for name, one in takers if topic in one.inputs or topic == STATUS or name == "recorder"]
 
     def is_streamed(self, topic: str) -> bool:
         """Whether a message of this topic comes in every period, so that lockstep can wait for it.
@@ -237,22 +231,20 @@ class Interface:
         found: dict[str, tuple[list[Input], Synchroniser]] = {}
         for reaction in sorted(declaration.reactions, key=lambda one: not self.is_streamed(one.trigger.topic)):
             used = [item for item in reaction.inputs if item.topic in self.topics and item.topic not in unused]
-            synchroniser = self._synchroniser(reaction, used, clock)
+            trigger, specs = reaction.trigger, {item.topic: self._spec(item) for item in used}
+            is_outer, started = self._is_outer(reaction), self._spec(trigger)
+            synchroniser = Synchroniser(self._timing, trigger.topic, specs, is_outer, reaction.thinned, started, clock)
             found[reaction.method] = used, synchroniser
-            if self.is_streamed(reaction.trigger.topic):
+            if started.streamed:
                 clock = clock or synchroniser
         for reaction in declaration.reactions:
             used, synchroniser = found[reaction.method]
             work = self._work(declaration, node, reaction)
+            essential = frozenset(i.topic for i in reaction.inputs if i.absent == "brake" and self.is_streamed(i.topic))
             for item in (reaction.trigger, *used):
                 arrays = item.arrays if self.topics[item.topic].side else WHOLE
-                feeds[item.topic].append(Feed(synchroniser, arrays, work, self.essential(reaction)))
+                feeds[item.topic].append(Feed(synchroniser, arrays, work, essential))
         return feeds
-
-    def _synchroniser(self, reaction: Reaction, used: list[Input], clock: Synchroniser | None) -> Synchroniser:
-        specs, trigger = {item.topic: self._spec(item) for item in used}, reaction.trigger
-        is_outer, started = self._is_outer(reaction), self._spec(trigger)
-        return Synchroniser(self._timing, trigger.topic, specs, is_outer, reaction.thinned, started, clock)
 
     def _is_outer(self, reaction: Reaction) -> bool:
         """Whether a reaction steps once per outer period."""
@@ -284,10 +276,6 @@ class Interface:
         limit = self._ages.limit_ns(item.age)
         is_outer, is_streamed = self.topics[item.topic].rate != "inner", self.is_streamed(item.topic)
         return InputSpec(is_outer, delay, is_streamed, limit, item.age == "command")
-
-    def essential(self, reaction: Reaction) -> frozenset[str]:
-        """The inputs of a reaction that a node of the bring-up streams and without which the driver has to brake."""
-        return frozenset(i.topic for i in reaction.inputs if i.absent == "brake" and self.is_streamed(i.topic))
 
     def upstream(self, topic: str) -> frozenset[str]:
         """Names of the nodes between the driver and a topic: those whose loss ends it."""
@@ -379,7 +367,7 @@ class Feed(NamedTuple):
     synchroniser : of all inputs of the reaction.
     arrays : of a JointState, the arrays that it takes.
     work : the step.
-    essential : inputs of the reaction without which the driver has to brake.
+    essential : inputs of the reaction that a node of the bring-up streams, and without which the driver has to brake.
     """
 
     synchroniser: Synchroniser
