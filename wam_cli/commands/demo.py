@@ -6,11 +6,12 @@ import os
 import shlex
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from wam_bag.bag_name import dated
 from wam_bag.errors import BagError
 from wam_cli.options import (
+    ARM,
     configuration_of,
     exit_code_of,
     filled,
@@ -57,6 +58,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     take_page(parser, default=None)
     take_configuration(parser)
+    parser.set_defaults(namespace=ARM, log_level="info")
 
 
 def _task(name: str) -> str:
@@ -169,15 +171,10 @@ def _report_of_task(task: Experiment, bag: Path, found: Any) -> tuple[str, tuple
     return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed
 
 
-class PlayedDemo(NamedTuple):
-    """How a demonstration ended: why it failed, if it did, and whether somebody stopped it."""
-
-    failures: list[str]
-    stopped: bool
-
-
-def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> PlayedDemo:
-    """Play the scenario of a configuration and record it into a bag.
+def play(
+    configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
+) -> tuple[list[str], bool]:
+    """Play the scenario of a configuration and record it into a bag; why that failed, and whether somebody stopped it.
 
     Raises
     ------
@@ -194,7 +191,7 @@ def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, giv
 
 def _simulated(
     configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
-) -> PlayedDemo:
+) -> tuple[list[str], bool]:
     if processes_of(configuration, given) != ONE or given.live:
         option = "--live" if given.live else "--processes" if given.processes else "--realtime"
         raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
@@ -203,30 +200,17 @@ def _simulated(
     failure = record(configuration, steps, bag, report=_stated, is_stopped=lambda: stop.is_set)
     if failure:
         print(f"error: {failure}", file=sys.stderr, flush=True)
-    return PlayedDemo([failure] if failure else [], stop.is_set)
+    return [failure] * bool(failure), stop.is_set
 
 
 def _stated(seconds: float, step: str) -> None:
     print(f"{seconds:5.1f} s  {step}", flush=True)
 
 
-def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> PlayedDemo:
-    from wam_cli.commands.live import page_next_to
-    from wam_ros.bring_up import Processes, run_together
-    from wam_ros.ros_topics import NAMESPACE
+def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> tuple[list[str], bool]:
+    from wam_cli.commands.up import run_nodes
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
-    stop, processes = Stop(), processes_of(configuration, given)
-    failures: list[str] = []
-    with page_next_to(given, NAMESPACE, lambda: stop.is_set) as close_page:
-        if processes == ONE:
-            last = run_together(configuration, NAMESPACE, "info", stop, close_page)
-        else:
-            with Processes(configuration, processes=processes) as stack:
-                stack.wait(lambda ended: stop.is_set or bool(ended))
-                failures += stack.failures
-                for failure in failures:  # before the others end and print what follows from it
-                    print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
-                close_page()
-            last = stack.bag_failure
-    return PlayedDemo([*failures, *([last] if last else [])], stop.is_set)
+    stop = Stop()
+    ended = run_nodes(configuration, given, stop)
+    return [*filter(None, (*ended.failures, ended.failure))], stop.is_set

@@ -99,19 +99,14 @@ def _recording(given: argparse.Namespace) -> int:
         from wam_live.playback import play
     stop = Stop()
     port = free_port(given.port, _print)
-    play(_run_of(given), port, lambda: stop.is_set, _print)
-    return 0
-
-
-def _run_of(given: argparse.Namespace) -> Any:
-    """The run of the arm in a bag; of several, it is named."""
     from wam_analysis.recording import AnalysedRecording
     from wam_bag.bag import read
 
     found = AnalysedRecording(read(given.bag), given.namespace or "")
-    if found.run.others:
+    if found.run.others:  # of several arms in a bag, this one is named
         _print(found.run.others)
-    return found
+    play(found, port, lambda: stop.is_set, _print)
+    return 0
 
 
 @contextmanager
@@ -133,29 +128,26 @@ def page_next_to(
     NoPageError
         if a page is required and there can be none.
     """
-    if given.live is False:
-        yield lambda: None
-        return
-    port = free_port(given.port, _print)
-    reason = obstacle(port)
-    if reason and given.live:
-        raise NoPageError(reason)
-    if reason:
-        _print(f"no live page: {reason}")
-        yield lambda: None
-        return
-    from wam_ros.bring_up import CommandProcess
-
-    # a process of its own can neither delay nor fail the stack
-    page = CommandProcess(["live", "--port", str(port), "--namespace", namespace], stdin=subprocess.DEVNULL)
     with ExitStack() as ending:
-        ending.callback(_end, page)
-        late = time.monotonic() + LATE
-        while page.poll() is None and port_is_free(port) and not is_stopped():
-            if time.monotonic() > late:
-                _print(f"the live page is still starting; it will be at {url(port)}")
-                break
-            time.sleep(0.05)
+        if given.live is not False:
+            port = free_port(given.port, _print)
+            reason = obstacle(port)
+            if reason and given.live:
+                raise NoPageError(reason)
+            if reason:
+                _print(f"no live page: {reason}")
+            else:
+                from wam_ros.bring_up import CommandProcess
+
+                # a process of its own can neither delay nor fail the stack
+                page = CommandProcess(["live", "--port", str(port), "--namespace", namespace], stdin=subprocess.DEVNULL)
+                ending.callback(_end, page)
+                late = time.monotonic() + LATE
+                while page.poll() is None and port_is_free(port) and not is_stopped():
+                    if time.monotonic() > late:
+                        _print(f"the live page is still starting; it will be at {url(port)}")
+                        break
+                    time.sleep(0.05)
         yield ending.close
 
 

@@ -3,7 +3,9 @@
 import argparse
 import shlex
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from wam_bag.bag_name import dated
 from wam_cli.commands.live import page_next_to
@@ -18,6 +20,7 @@ from wam_cli.options import (
     timed,
 )
 from wam_control.task.scenario import load_for
+from wam_description.configuration import Configuration
 from wam_description.interface import declared
 from wam_description.nodes import ONE
 from wam_ros.bring_up import Processes, process_of, run_together
@@ -63,34 +66,53 @@ def run(given: argparse.Namespace) -> int:
                 "key push (a real arm can be pushed by hand)"
             )
     stop = Stop()
-    processes = processes_of(configuration, given)
-    killed: list[str] = []
-    with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
-        started = f"{len(configuration.shared.nodes)} nodes in"
-        if processes == ONE:
-            print(f"{started} this process; Ctrl-C stops them", flush=True)
-            failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)
-            names = ", ".join(declared(entry).name for entry in configuration.shared.nodes)
-            ended = {} if stop.is_set else {names: int(bool(failure))}
-        else:
-            with Processes(configuration, given.namespace, given.log_level, processes) as stack:
-                each = stack.processes
-                if not stop.is_set:
-                    print(f"{started} {len(each)} processes ({'; '.join(each)}); Ctrl-C stops them", flush=True)
-                ended = stack.wait(lambda ended: stop.is_set or bool(ended))
-                for failure in stack.failures:
-                    print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
-                close_page()
-            failure, killed = stack.bag_failure, stack.killed
+    ended = run_nodes(configuration, given, stop, f"{len(configuration.shared.nodes)} nodes in")
     is_played = False
-    for process, code in ended.items():
+    for process, code in ended.codes.items():
         is_scenario = "scenario" in process.split(", ")
         is_played |= is_scenario
         who = "the scenario" if is_scenario else process_of(process)
         print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
-    if given.scenario and is_played and not any(ended.values()):
+    if given.scenario and is_played and not any(ended.codes.values()):
         seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
         print(f"to see whether its commands were carried out: {seen}")
-    if failure:
-        print(f"error: {failure}", file=sys.stderr)
-    return max([abs(code) for code in ended.values()], default=0) or int(bool(killed or failure))
+    if ended.failure:
+        print(f"error: {ended.failure}", file=sys.stderr)
+    return max(map(abs, ended.codes.values()), default=0) or int(bool(ended.killed or ended.failure))
+
+
+class Ended(NamedTuple):
+    """How the nodes ended: exit codes by process, unless they were stopped, and why not as they should."""
+
+    codes: Mapping[str, int]
+    failure: str  # of the last node, or of the recording
+    failures: Sequence[str] = ()  # printed before, where the nodes are several processes
+    killed: Sequence[str] = ()
+
+
+def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Stop, started: str = "") -> Ended:
+    """Run the nodes, and a page next to them, until the first ends.
+
+    Parameters
+    ----------
+    given : options of `take_time` and `take_page`, namespace and log level.
+    started : printed before the names of the processes; '' for nothing.
+    """
+    processes = processes_of(configuration, given)
+    with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
+        if processes == ONE:
+            if started:
+                print(f"{started} this process; Ctrl-C stops them", flush=True)
+            failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)
+            names = ", ".join(declared(entry).name for entry in configuration.shared.nodes)
+            return Ended({} if stop.is_set else {names: int(bool(failure))}, failure)
+        with Processes(configuration, given.namespace, given.log_level, processes) as stack:
+            each = stack.processes
+            if started and not stop.is_set:
+                print(f"{started} {len(each)} processes ({'; '.join(each)}); Ctrl-C stops them", flush=True)
+            codes = stack.wait(lambda ended: stop.is_set or bool(ended))
+            failures = stack.failures
+            for failure in failures:  # before the others end and print what follows from it
+                print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
+            close_page()
+        return Ended(codes, stack.bag_failure, failures, stack.killed)
