@@ -74,6 +74,9 @@ class Synchroniser:
 
     Attributes
     ----------
+    inlets : by topic, what takes the stamp and value of an input and returns the inputs of each step that is now
+        complete, in the order of their stamps.  It raises OutOfTime where the stamp differs from that of the newest
+        state by more than the limit of the input, or where a command that starts a step has none.
     strays : messages that do not go on from those before: older ones, or a second one for the same state.
     """
 
@@ -98,15 +101,15 @@ class Synchroniser:
         self._triggers: deque[tuple[int, Any]] = deque()
         self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
         self._groups: list[_Group] = []
-        self._inlets: dict[str, Inlet] = {trigger: self._start if started.streamed else self._commanded(started, clock)}
+        self.inlets: dict[str, Inlet] = {trigger: self._start if started.streamed else self._commanded(started, clock)}
         rules = {topic: (outer or spec.outer, spec.delay) for topic, spec in waited.items()}
         for is_outer, delay in dict.fromkeys(rules.values()):
             topics = [topic for topic, rule in rules.items() if rule == (is_outer, delay)]
             repeats = timing.outer_period_ns if is_outer else 1
             group = _Group(delay * timing.period_ns, repeats, self._outer_phase, tuple(topics))
             self._groups.append(group)
-            self._inlets.update({topic: self._waited(topic, group, waited[topic]) for topic in topics})
-        self._inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
+            self.inlets.update({topic: self._waited(topic, group, waited[topic]) for topic in topics})
+        self.inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
         self._lacks: tuple[_Group, int, int] | None = None  # see `_inputs`
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
         self._early: deque[tuple[str, int, Any]] = deque(maxlen=INPUTS.early)
@@ -152,21 +155,6 @@ class Synchroniser:
         if topic == self._trigger:
             return not self._thinned or stamp % self._outer_period == self._outer_phase
         return not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase
-
-    def put(self, topic: str, stamp: int, value: Any) -> Sequence[Inputs]:
-        """Take an input; returns the inputs of each step that is now complete, in the order of their stamps.
-
-        Raises
-        ------
-        OutOfTime
-            where the stamp differs from that of the newest state by more than the limit of the input, or where a
-            command that starts a step has none.
-        """
-        return self._inlets[topic](stamp, value)
-
-    def inlet(self, topic: str) -> Inlet:
-        """What `put` does with the inputs of one topic, as a function of stamp and value."""
-        return self._inlets[topic]
 
     def _waited(self, topic: str, group: "_Group", waited: InputSpec) -> Inlet:
         """The inlet of an input that steps wait for."""
@@ -298,7 +286,7 @@ class Synchroniser:
         self.restart(begin)
         for topic, early, value in self._early:
             if begin <= early <= stamp:
-                self._inlets[topic](early, value)
+                self.inlets[topic](early, value)
         self._early.clear()
         return True
 

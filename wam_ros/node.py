@@ -102,7 +102,7 @@ class AdaptedNode(StackNode):
             self.inlets.listen(topic, lambda data: None)
             return
         self._synchronisers.update(feed.synchroniser for feed in feeds)
-        puts = [(feed, feed.synchroniser.inlet(topic), mask(feed.arrays) if feeds[1:] else None) for feed in feeds]
+        puts = [(feed, feed.synchroniser.inlets[topic], mask(feed.arrays) if feeds[1:] else None) for feed in feeds]
         # what the stack does not stream comes from, or follows from, a program of the user, whom the status informs
         is_dated = self.interface.is_streamed(topic)
         of_user = not is_dated or any(item.age == "command" for item in self._declaration.taken if item.topic == topic)

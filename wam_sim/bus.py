@@ -139,7 +139,7 @@ class _Outlets(dict[str, Publish]):
 
 def _inlet(feed: Feed, topic: str, is_masked: bool) -> Inlet:
     """Where a reaction takes a topic; masked, it gets of a JointState only what it declares."""
-    inlet, masked = feed.synchroniser.inlet(topic), mask(feed.arrays)
+    inlet, masked = feed.synchroniser.inlets[topic], mask(feed.arrays)
     return (lambda stamp, value: inlet(stamp, masked(value))) if is_masked else inlet
 
 

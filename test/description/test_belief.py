@@ -37,11 +37,11 @@ class Realtime:
         """The input in the last of some steps."""
         for _ in range(count):
             self.stamp += 5 * MS
-            (inputs,) = self.synchroniser.put("state", self.stamp, "state")
+            (inputs,) = self.synchroniser.inlets["state"](self.stamp, "state")
         return inputs["input"]
 
     def give(self, value: str, stamp: int | None = None) -> None:
-        assert list(self.synchroniser.put("input", self.stamp if stamp is None else stamp, value)) == []
+        assert list(self.synchroniser.inlets["input"](self.stamp if stamp is None else stamp, value)) == []
 
 
 @pytest.mark.parametrize("spec", [FEEDBACK, COMMAND], ids=["feedback", "command"])
@@ -99,7 +99,7 @@ def test_a_step_that_a_program_starts_has_the_states_of_another_step_as_its_cloc
     clock = Synchroniser(REALTIME, "state", {})
     step = Synchroniser(REALTIME, "command", {}, started=FEEDBACK._replace(streamed=False), clock=clock)
     with pytest.raises(OutOfTime, match="no stamp"):
-        Synchroniser(REALTIME, "command", {}, started=FEEDBACK._replace(streamed=False)).put("command", 0, "")
+        Synchroniser(REALTIME, "command", {}, started=FEEDBACK._replace(streamed=False)).inlets["command"](0, "")
     for now, stamp, used in (  # ms
         (5, 5, 5),
         (5, 5, 5),
@@ -111,12 +111,12 @@ def test_a_step_that_a_program_starts_has_the_states_of_another_step_as_its_cloc
         (1, 1, 1),  # of a driver that has started again
     ):
         clock.restart()
-        clock.put("state", now * MS, "state")
+        clock.inlets["state"](now * MS, "state")
         if isinstance(used, str):
             with pytest.raises(OutOfTime, match=f"{used}.*allowed: 0.04 s"):
-                step.put("command", stamp * MS, "")
+                step.inlets["command"](stamp * MS, "")
         else:
-            made = [inputs.stamp for inputs in step.put("command", stamp * MS, "") if inputs.dt > 0.0]
+            made = [inputs.stamp for inputs in step.inlets["command"](stamp * MS, "") if inputs.dt > 0.0]
             assert made == ([] if used is None else [used * MS])
 
 
@@ -134,7 +134,7 @@ def test_one_state_of_the_future_does_not_make_a_node_deaf(mode: str) -> None:
     node = Realtime(FEEDBACK._replace(streamed=False), dataclasses.replace(REALTIME, mode=mode))
     node.state()
     with pytest.raises(OutOfTime, match="ahead of the newest state"):
-        node.synchroniser.put("state", NOW, "foreign")
+        node.synchroniser.inlets["state"](NOW, "foreign")
     node.state(3)
     assert node.synchroniser.strays == 1
 
@@ -144,21 +144,21 @@ def test_the_states_of_a_driver_that_starts_again_are_followed_at_the_second_one
     node.state(1000)
     node.give("of the driver before")
     node.stamp = 0
-    assert list(node.synchroniser.put("state", MS, "first")) == []
-    (inputs,) = node.synchroniser.put("state", 2 * MS, "second")
+    assert list(node.synchroniser.inlets["state"](MS, "first")) == []
+    (inputs,) = node.synchroniser.inlets["state"](2 * MS, "second")
     assert (inputs.stamp, inputs["input"]) == (2 * MS, None)
 
 
 def test_a_session_lets_a_step_in_lockstep_begin_again_with_the_first_state() -> None:
     synchroniser = Synchroniser(dataclasses.replace(REALTIME, mode="lockstep"), "state", {"input": FEEDBACK})
-    synchroniser.put("input", 6 * MS, "old")
-    synchroniser.put("state", 6 * MS, "old")
+    synchroniser.inlets["input"](6 * MS, "old")
+    synchroniser.inlets["state"](6 * MS, "old")
     synchroniser.restart(MS)
-    synchroniser.put("input", MS, "new")
-    (inputs,) = synchroniser.put("state", MS, "first")
+    synchroniser.inlets["input"](MS, "new")
+    (inputs,) = synchroniser.inlets["state"](MS, "first")
     assert (inputs["state"], inputs["input"]) == ("first", "new")
     synchroniser.restart(14 * MS)
-    (inputs,) = synchroniser.put("state", 14 * MS, "in the midst of an outer period, whose answers are gone")
+    (inputs,) = synchroniser.inlets["state"](14 * MS, "in the midst of an outer period, whose answers are gone")
     assert inputs["input"] is None
 
 
@@ -218,10 +218,10 @@ def test_the_node_that_lacks_nothing_and_did_not_answer_is_named(
 
 def test_a_session_that_only_a_status_announces_forgets_nothing() -> None:
     synchroniser = Synchroniser(dataclasses.replace(REALTIME, mode="lockstep"), "state", {"input": FEEDBACK})
-    synchroniser.put("state", 6 * MS, "waiting")
+    synchroniser.inlets["state"](6 * MS, "waiting")
     assert synchroniser.awaited(6 * MS) == ["input"]
     synchroniser.follow(MS)  # anybody can send that
-    (inputs,) = synchroniser.put("input", 6 * MS, "its input")
+    (inputs,) = synchroniser.inlets["input"](6 * MS, "its input")
     assert (inputs["state"], inputs["input"]) == ("waiting", "its input")
     assert synchroniser.awaited(6 * MS) == []
     assert synchroniser.awaited(11 * MS) == ["state"]
@@ -229,10 +229,10 @@ def test_a_session_that_only_a_status_announces_forgets_nothing() -> None:
 
 def test_a_session_that_a_state_confirms_begins_with_it_and_with_what_came_before_it() -> None:
     synchroniser = Synchroniser(dataclasses.replace(REALTIME, mode="lockstep"), "state", {"input": FEEDBACK})
-    synchroniser.put("state", 6 * MS, "of the driver before")
+    synchroniser.inlets["state"](6 * MS, "of the driver before")
     synchroniser.follow(MS)
-    assert list(synchroniser.put("input", MS, "early")) == []
-    (inputs,) = synchroniser.put("state", MS, "first")
+    assert list(synchroniser.inlets["input"](MS, "early")) == []
+    (inputs,) = synchroniser.inlets["state"](MS, "first")
     assert (inputs["state"], inputs["input"]) == ("first", "early")
 
 
@@ -266,7 +266,7 @@ class Intruder:
         refused = 0
         for synchroniser in {one for found in self.run._synchronisers.values() for one in found}:
             try:
-                assert list(synchroniser.put(topic, stamp, value)) == []
+                assert list(synchroniser.inlets[topic](stamp, value)) == []
             except OutOfTime:
                 refused += 1
             except KeyError:  # the step does not take this topic

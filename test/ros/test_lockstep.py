@@ -134,7 +134,7 @@ TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0, 0)
 
 def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list[tuple[int, float, str, str | None]]:
     """Stamp, dt, state and command of each step that an input completes."""
-    steps = synchroniser.put(topic, stamp, value)
+    steps = synchroniser.inlets[topic](stamp, value)
     return [(inputs.stamp, inputs.dt, inputs["state"], inputs["command"]) for inputs in steps]
 
 
@@ -191,8 +191,8 @@ def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:
 def test_the_age_of_an_input_counts_from_the_state_that_caused_it(mode: str) -> None:
     timing = dataclasses.replace(TIMING, mode=mode)
     synchroniser = Synchroniser(timing, "state", {"command": InputSpec(outer=True, delay=1)})
-    assert list(synchroniser.put("command", 1_000_000, "c1")) == []
-    (inputs,) = synchroniser.put("state", 4_000_000, "s4")
+    assert list(synchroniser.inlets["command"](1_000_000, "c1")) == []
+    (inputs,) = synchroniser.inlets["state"](4_000_000, "s4")
     assert (inputs.age("command"), inputs.stamp_of("command")) == (0.003, 1_000_000)
     assert (inputs.age("nothing"), inputs["nothing"]) == (0.0, None)
 
@@ -202,8 +202,8 @@ def test_an_outer_step_takes_states_and_inputs_of_outer_periods_only(delay: int,
     spec = InputSpec(outer=False, delay=delay)
     synchroniser = Synchroniser(TIMING, "state", {"sensors": spec}, outer=True, thinned=True)
     for tick in range(1, 12):
-        synchroniser.put("sensors", tick * 1_000_000, tick)
-        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
+        synchroniser.inlets["sensors"](tick * 1_000_000, tick)
+        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.inlets["state"](tick * 1_000_000, tick)]
         assert steps == ([(tick * 1_000_000, taken[tick])] if tick in taken else [])
 
 
@@ -211,10 +211,10 @@ def test_an_outer_step_waits_for_its_inputs_of_both_rates_and_leaves_out_what_on
     specs = {"sensors": InputSpec(outer=False), "estimate": InputSpec(outer=True)}
     synchroniser = Synchroniser(TIMING, "state", specs, outer=True)
     ms = 1_000_000
-    assert list(synchroniser.put("state", 1 * ms, "s1")) == []
+    assert list(synchroniser.inlets["state"](1 * ms, "s1")) == []
     for tick in range(1, 7):
-        assert list(synchroniser.put("sensors", tick * ms, tick)) == []
+        assert list(synchroniser.inlets["sensors"](tick * ms, tick)) == []
     assert synchroniser.missing(1 * ms) == ["estimate"]
-    assert list(synchroniser.put("state", 6 * ms, "s6")) == []
-    (inputs,) = synchroniser.put("estimate", 6 * ms, "e6")  # that of the first one can no longer come
+    assert list(synchroniser.inlets["state"](6 * ms, "s6")) == []
+    (inputs,) = synchroniser.inlets["estimate"](6 * ms, "e6")  # that of the first one can no longer come
     assert (inputs["state"], inputs["sensors"], inputs["estimate"]) == ("s6", 6, "e6")
