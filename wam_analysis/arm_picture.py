@@ -15,10 +15,10 @@ from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL_COLOUR, T
 from wam_analysis.thresholds import LAYOUT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
-from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import rows
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, ObjectState
+from wam_description.small_matrices import rotation_xyz
 from wam_description.world import World
 
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame

@@ -10,7 +10,7 @@
 - world: parameters of what the arm can touch
 - movable: parameters of what the arm can move, and of what moves by itself
 - transmission_map: motors to joints and back, (A.5)
-- small_matrices: products of small vectors, the inverse of a matrix
+- small_matrices: rotations, products of small vectors, the inverse of a matrix
 - rigid_body: kinematics and dynamics of the links
 - mjcf, urdf: the arm as a model for MuJoCo and for ROS; xml_element: their numbers; frames: its frames as transforms
 - mjcf_objects: free bodies and doors in the model for MuJoCo

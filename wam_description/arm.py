@@ -15,6 +15,7 @@ from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
 from wam_description.parameters import aligned, lengths, named, parameter, require, rows
 from wam_description.parts import Joints, Links, Motors
+from wam_description.small_matrices import rotation_xyz
 from wam_description.thresholds import FILES, MODEL
 from wam_description.units import STANDARD_GRAVITY
 
@@ -62,12 +63,6 @@ class Covers:
         start, end = self.start[at : at + 3], self.end[at : at + 3]
         fraction = (place - start[0]) / (end[0] - start[0]) if end[0] != start[0] else 0.0
         return start[1] + fraction * (end[1] - start[1]), start[2] + fraction * (end[2] - start[2])
-
-
-def _turned_x(rotation: Sequence[float]) -> tuple[float, float, float]:
-    """The x axis of a frame that is turned by roll, pitch and yaw, rad."""
-    _, pitch, yaw = rotation
-    return math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)
 
 
 def _point(point: Sequence[float]) -> str:
@@ -119,7 +114,7 @@ class Arm:
         joints, links = rows(self.joints), self.links.names
         following = (*self.joints.places[1:], self.tool)
         for cover in rows(self.covers):
-            x, link = np.array(_turned_x(cover.rotation)), links.index(cover.link)
+            x, link = rotation_xyz(*cover.rotation)[:, 0], links.index(cover.link)
             end = cover.origin + cover.length * x
             beyond = end - following[link]
             along = float(beyond @ x)

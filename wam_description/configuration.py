@@ -57,7 +57,7 @@ class Configuration(NamedTuple):
         """
         path = Path(path)
         (first, tree), *overlays = reversed(_chain(path))
-        whole = cls(first, _sections(first, tree))
+        whole = _made(first, _sections(first, tree))
         for overlay, changes in overlays:
             whole = whole.with_sections(_sections(overlay, changes, whole=False), overlay)
         return whole
@@ -118,7 +118,7 @@ class Configuration(NamedTuple):
                     )
                 )
             flat[parameter] = shaped_like(flat.get(parameter), value)
-        return Configuration(self.path, _frozen(sections))
+        return _made(self.path, sections)
 
     def _meant(self, key: str) -> str:
         """Parameters that `key` may mean: of this name in another section, or the one that is most like it."""
@@ -158,7 +158,7 @@ class Configuration(NamedTuple):
                 )
         if has_own:  # it may have more parameters than a node of the base
             sections |= {name: {**flat, **sections[name]} for name, flat in changes.items() if name != SHARED}
-        return Configuration(path, _frozen(sections)).with_values(
+        return _made(path, sections).with_values(
             {
                 key if name == SHARED else f"{name}:{key}": value
                 for name, flat in changes.items()
@@ -169,7 +169,7 @@ class Configuration(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle plain mappings: read-only ones cannot be pickled, and are made read-only again on the other side."""
-        return _thawed, (self.path, {name: dict(flat) for name, flat in self.sections.items()})
+        return _made, (self.path, {name: dict(flat) for name, flat in self.sections.items()})
 
     def _section(self, node: str) -> str:
         if node == SHARED or node not in self.sections:
@@ -393,15 +393,14 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
                 f"{path}: section '{key}' needs '{PARAMETERS}:' with names and values below it, and nothing else"
             )
         sections[name] = given_once(f"{path}: section '{key}'", body[PARAMETERS])
-    return _frozen(sections)
+    return sections
 
 
-def _thawed(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
-    return Configuration(path, _frozen(sections))
-
-
-def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:
-    return MappingProxyType({name: MappingProxyType(dict(flat)) for name, flat in sections.items()})
+def _made(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
+    """A configuration of values that cannot be changed in their place."""
+    return Configuration(
+        path, MappingProxyType({name: MappingProxyType(dict(flat)) for name, flat in sections.items()})
+    )
 
 
 def _is_mixed(value: Any) -> bool:

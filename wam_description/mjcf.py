@@ -5,7 +5,6 @@ base; two fixed tendons (strands) per cable circuit, of length theta_m - (row of
 springs together are the transmission stiffness k_tr on the motor side.
 """
 
-import math
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -17,6 +16,7 @@ from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors
 from wam_description.parameters import require, rows
 from wam_description.parts import Motors
+from wam_description.small_matrices import rotation_xyz
 from wam_description.thresholds import MODEL
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import PUSHER_SHAPES, SHAPES, Folding, Pushers, Springs, World
@@ -165,18 +165,6 @@ def _add_cover(body: Element, i: int, cover: Any, clearance: float | None) -> No
             size=cover.radius,
             rgba="0.25 0.25 0.28 1" if i % 2 == 0 else "0.35 0.35 0.4 1",
         )
-
-
-def rotation_xyz(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Rotation matrix (3, 3) of URDF's roll, pitch, yaw: about fixed x, then y, then z."""
-    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 def _add_obstacle(world: Element, obstacle: Any, moves: bool) -> None:

@@ -76,12 +76,11 @@ class TransmissionMap:
 
     def largest_joint_torques(self, peak_torque: Sequence[float]) -> list[float]:
         """Largest torque at each joint alone, n, N m, with up to peak_torque, n, N m, from each motor."""
-        absolute = [[(j, abs(factor)) for j, factor in row] for row in self._inverse_transposed]
-        return _product(absolute, peak_torque)
+        return _product(_terms(np.abs(self.motor_from_joint.T)), peak_torque)
 
     def largest_motor_velocities(self, speed_limit: Sequence[float]) -> list[float]:
         """Largest speed of each motor, n, rad/s, with joints up to speed_limit, n, rad/s."""
-        return _product([[(j, abs(factor)) for j, factor in row] for row in self._inverse], speed_limit)
+        return _product(_terms(np.abs(self.motor_from_joint)), speed_limit)
 
 
 def _terms(matrix: NDArray[np.float64]) -> list[list[tuple[int, float]]]:

@@ -61,7 +61,7 @@ def urdf(arm: Arm, namespace: str = "") -> str:
 def _add_link(robot: Element, arm: Arm, i: int, link: Any) -> None:
     element = add(robot, "link", name=link.name)
     inertial = add(element, "inertial")
-    _add_origin(inertial, link.centre)
+    add(inertial, "origin", xyz=link.centre, rpy=ZERO)
     add(inertial, "mass", value=link.mass)
     tensor = arm.carried.tensor(i)
     elements = ((a, b) for a in range(3) for b in range(a, 3))
@@ -74,7 +74,7 @@ def _add_link(robot: Element, arm: Arm, i: int, link: Any) -> None:
 def _add_joint(robot: Element, arm: Arm, i: int, joint: Any, effort: float) -> None:
     parent = arm.links.names[i - 1] if i else BASE
     element = _add_connection(robot, joint.name, "revolute", parent, arm.links.names[i])
-    _add_origin(element, joint_placement(arm, i).translation, (joint.twist, 0.0, 0.0))
+    add(element, "origin", xyz=joint_placement(arm, i).translation, rpy=(joint.twist, 0.0, 0.0))
     add(element, "axis", xyz="0 0 1")
     add(element, "limit", lower=joint.lower, upper=joint.upper, effort=effort, velocity=joint.speed_limit)
 
@@ -92,14 +92,14 @@ def _add_tube(link: Element, placement: pin.SE3, cover: Any) -> None:
 
 def _add_shape(link: Element, tag: str, xyz: Iterable[float], rpy: Iterable[float], shape: str, **size: float) -> None:
     part = add(link, tag)
-    _add_origin(part, xyz, rpy)
+    add(part, "origin", xyz=xyz, rpy=rpy)
     add(add(part, "geometry"), shape, **size)
 
 
 def _add_fixed(
     robot: Element, parent: str, child: str, xyz: Iterable[float] = ZERO, rpy: Iterable[float] = ZERO
 ) -> None:
-    _add_origin(_add_connection(robot, f"{child}_frame", "fixed", parent, child), xyz, rpy)
+    add(_add_connection(robot, f"{child}_frame", "fixed", parent, child), "origin", xyz=xyz, rpy=rpy)
 
 
 def _add_connection(robot: Element, name: str, kind: str, parent: str, child: str) -> Element:
@@ -107,10 +107,6 @@ def _add_connection(robot: Element, name: str, kind: str, parent: str, child: st
     add(joint, "parent", link=parent)
     add(joint, "child", link=child)
     return joint
-
-
-def _add_origin(parent: Element, xyz: Iterable[float], rpy: Iterable[float] = ZERO) -> None:
-    add(parent, "origin", xyz=xyz, rpy=rpy)
 
 
 def _along(direction: NDArray[np.float64]) -> tuple[float, float, float]:

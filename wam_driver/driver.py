@@ -12,9 +12,9 @@ from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.event import Value, fault
 from wam_description.mismatch import ModelMismatch, true_arm
-from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import parameter, require
 from wam_description.signals import BASE, NO_LOAD, ZERO, Answer, Load, Point, State, Table, Wrench
+from wam_description.small_matrices import rotation_xyz
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
