@@ -27,7 +27,7 @@ from wam_ros.wire import stamp_in
 
 KEPT = {"motor_states": " ".join(State._fields), "motor_currents": "effort"}  # arrays that must be filled
 COMMAND = "motor_current_command"
-Restart = Callable[[], None]
+Restart = Callable[[], object]
 
 
 class Untested(Exception):

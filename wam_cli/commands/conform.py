@@ -3,8 +3,7 @@
 import argparse
 import shlex
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from multiprocessing import get_context
 
 from wam_cli.options import COUNT, bounded, configuration_of, take_configuration, take_stack
@@ -100,45 +99,29 @@ def run(given: argparse.Namespace) -> int:
     elif occupant(requested_domain(), f"/{given.namespace}", "velocity_loop"):
         raise ValueError(f"wam conform takes the place of velocity_loop; stop the stack, then {cure}")
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
-    with (
-        DriverBench(configuration.shared, given.share, given.current, given.namespace) as bench,
-        served(configuration, given.arm),
-    ):
+    with DriverBench(configuration.shared, given.share, given.current, given.namespace) as bench, ExitStack() as ending:
+        if given.arm:  # a process of its own
+            arm = get_context("spawn").Process(target=_serve, args=(configuration, given.arm), daemon=True)
+            arm.start()
+            ending.callback(arm.terminate)
         if given.running and not bench.wait(lambda: bench.is_published("motor_states")):
             raise ValueError(f"no driver publishes /{given.namespace}/motor_states; {cure}")
         timing = configuration.shared.timing
         set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
         print(f"driver under test: {entry}; it logs the faults that this test causes")
-        started: list[NodeProcess] = []
 
-        def start() -> None:
-            started.append(NodeProcess(configuration, [entry], given.namespace))
+        def start() -> NodeProcess:
+            driver = NodeProcess(configuration, [entry], given.namespace)
+            ending.callback(driver.close)
+            return driver
 
-        try:
-            if not given.running:
-                start()
-                bench.end, bench.restart = started[-1].close, start
-            for row in conformance_rows(bench, given.attempts):
-                counts[row.verdict] += 1
-                print(row.text, flush=True)
-        finally:
-            for driver in started:
-                driver.close()
+        if not given.running:
+            bench.end, bench.restart = start().close, start
+        for row in conformance_rows(bench, given.attempts):
+            counts[row.verdict] += 1
+            print(row.text, flush=True)
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return int(counts[WRONG] > 0)
-
-
-@contextmanager
-def served(configuration: Configuration, version: int) -> Iterator[None]:
-    """A simulated arm on the bus of a configuration, in a process of its own; none where the version is 0."""
-    arm = get_context("spawn").Process(target=_serve, args=(configuration, version), daemon=True)
-    if version:
-        arm.start()
-    try:
-        yield
-    finally:
-        if version:
-            arm.terminate()
 
 
 def _serve(configuration: Configuration, version: int) -> None:
