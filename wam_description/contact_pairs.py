@@ -60,25 +60,16 @@ def folded(cover: str) -> str:
     return f"{cover}_folded"
 
 
-def _through_cover(pair: ContactPair, stiffness: float) -> ContactPair:
-    """A contact with a cover of this stiffness in series, N/m; 0 for a rigid one.
+def _on_cover(cover: str, what: str, touched: Sequence[Any], stiffness: float = 0.0) -> Iterator[ContactPair]:
+    """A cover of this stiffness, N/m, 0 for a rigid one, in series with everything that it may touch.
 
     Of the depth the share k/(k_c + k) is that of the surface; hardening counts to first order of the depth.
     """
-    if not stiffness:
-        return pair
-    share = stiffness / (pair.stiffness + stiffness)
-    squared = share * share
-    return pair._replace(
-        stiffness=share * pair.stiffness, damping=squared * pair.damping, hardening=squared * pair.hardening
-    )
-
-
-def _on_cover(cover: str, what: str, touched: Sequence[Any], stiffness: float = 0.0) -> Iterator[ContactPair]:
-    """A cover of this stiffness, N/m, 0 for a rigid one, with everything that it may touch."""
     for one in touched:
-        law = one.stiffness, one.damping, getattr(one, "hardening", 0.0), one.friction
-        yield _through_cover(ContactPair(cover, one.name, f"{what} '{one.name}'", *law), stiffness)
+        share = stiffness / (one.stiffness + stiffness) if stiffness else 1.0
+        squared, hardening = share * share, getattr(one, "hardening", 0.0)
+        law = share * one.stiffness, squared * one.damping, squared * hardening, one.friction
+        yield ContactPair(cover, one.name, f"{what} '{one.name}'", *law)
 
 
 def _of_bodies(world: World) -> Iterator[ContactPair]:

@@ -70,12 +70,11 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
 def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     motors, joints = arm.motors.names, arm.joints.names
     covers, obstacles = arm.covers.names, world.obstacles.names
-    parts = {
-        "obstacle": covers,
-        "pusher": (*covers, *obstacles),
-        "object": (*covers, *arm.links.names, *motors, *joints),
-    }
-    for (what, taken), names in zip(parts.items(), (obstacles, world.pushers.names, world.objects), strict=True):
+    for what, names, taken in (
+        ("obstacle", obstacles, covers),
+        ("pusher", world.pushers.names, (*covers, *obstacles)),
+        ("object", world.objects, (*covers, *arm.links.names, *motors, *joints)),
+    ):
         for name in names:
             require(name not in taken, f"{what} '{name}' has the name of a part of the arm or an obstacle; rename it")
     for pusher in rows(world.pushers):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from wam_description.parameters import empty, named, parameter, require, rows
+from wam_description.parameters import named, parameter, require, rows
 
 BOX = {"box": 3}  # numbers that the size of a shape needs
 BODY_SHAPES = {**BOX, "cylinder": 2, "ball": 1}
@@ -157,8 +157,3 @@ def require_solids(group: str, given: Any, shapes: Mapping[str, int] = BOX) -> N
             f"{one.name}: {group}.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
             "each must be above 0",
         )
-
-
-NO_BODIES = empty(FreeBodies)
-NO_DOORS = empty(Doors)
-NO_MOTIONS = empty(Motions)

@@ -3,17 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from wam_description.movable import (
-    BOX,
-    NO_BODIES,
-    NO_DOORS,
-    NO_MOTIONS,
-    Countable,
-    Doors,
-    FreeBodies,
-    Motions,
-    require_solids,
-)
+from wam_description.movable import BOX, Countable, Doors, FreeBodies, Motions, require_solids
 from wam_description.parameters import aligned, empty, parameter, require, rows
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
@@ -134,8 +124,7 @@ class Folding:
     )
 
 
-NO_FOLDING = Folding(0.0, 0.0, 0.0, 0.0)
-NO_PUSHERS = empty(Pushers)
+NO_PUSHERS, NO_BODIES, NO_DOORS, NO_MOTIONS = empty(Pushers), empty(FreeBodies), empty(Doors), empty(Motions)
 
 
 class Solid(NamedTuple):
@@ -157,7 +146,7 @@ class World:
     bodies: FreeBodies = NO_BODIES
     doors: Doors = NO_DOORS
     motions: Motions = NO_MOTIONS
-    folding: Folding = NO_FOLDING
+    folding: Folding = Folding(0.0, 0.0, 0.0, 0.0)
     cover_stiffness: float = parameter(
         "stiffness of the covers, in series with what they touch (1.1.1), except pushers and springs; 0: rigid",
         "N/m",

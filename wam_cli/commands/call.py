@@ -1,7 +1,6 @@
 """`wam call`: one request to a running stack: a service, a parameter, a topic, a push."""
 
 import argparse
-import difflib
 import math
 import re
 import sys
@@ -15,7 +14,7 @@ from wam_cli.options import COUNT, bounded, namespace, take_stack
 from wam_control.task.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
-from wam_description.parameters import build_part, fields
+from wam_description.parameters import build_part, fields, meant
 from wam_description.signals import Answer, Wrench
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
@@ -155,10 +154,8 @@ def _like(value: Any, like: Any, name: str) -> Any:
 
 
 def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
-    near = difflib.get_close_matches(name, values, n=1)
-    return f"node '{node}' has no parameter '{name}'" + (
-        f"; did you mean '{near[0]}'?" if near else f"; 'wam call get {node}' lists them"
-    )
+    cure = meant(name, values).rstrip() or f"'wam call get {node}' lists them"
+    return f"node '{node}' has no parameter '{name}'; {cure}"
 
 
 def _echo(given: argparse.Namespace, stack: StackClient) -> int:

@@ -84,7 +84,7 @@ def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study
         _add(parser, one)
     take_configuration(parser, kind.base)
     take_batch(parser, name)
-    parser.set_defaults(part=name, config=kind.base, study=kind)
+    parser.set_defaults(part=name, study=kind)
 
 
 def _options(kind: type[Study[Any, Any]]) -> Iterator[Field[Any]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from wam_analysis.table import markdown
 from wam_bag.bag_name import dated
-from wam_cli.options import PAGE, bounded, writable_directory
+from wam_cli.options import COUNT, PAGE, writable_directory
 from wam_ros.bring_up import Composition
 from wam_sim.batch import processes, results
 from wam_sim.progress import Progress
@@ -53,7 +53,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--jobs",
-        type=bounded(int, 1),
+        type=COUNT,
         default=os.cpu_count() or 1,
         help="number of processes; default: one for each core",
     )
