@@ -373,7 +373,7 @@ class Feed(NamedTuple):
     synchroniser: Synchroniser
     arrays: str
     work: Callable[[Inputs], Outputs]
-    essential: frozenset[str] = frozenset()
+    essential: frozenset[str]
 
 
 @cache

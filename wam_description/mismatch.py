@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from wam_description.arm import Arm
+from wam_description.cables import Cables
 from wam_description.parameters import aligned, parameter
 from wam_description.parts import Joints, Links, Motors
 
-Shafts = TypeVar("Shafts", Motors, Joints)
+Part = TypeVar("Part", Motors, Joints, Links, Cables)
+FRICTION = ("static_friction", "dynamic_friction", "viscous_friction")
 
 
 @dataclass(frozen=True)
@@ -35,35 +37,22 @@ def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
     aligned("mismatch", arm.motors.names, mismatch)
     by_motor = dict(zip(arm.motors.names, mismatch.stiffness, strict=True))
     stages = [by_motor[motor] for motor in arm.cables.stage_motors]
-    constants = _scaled(arm.motors.torque_constant, mismatch.torque_constant)
+    motors = _scaled(arm.motors, mismatch.torque_constant, "torque_constant")
     return dataclasses.replace(
         arm,
-        motors=dataclasses.replace(_with_friction(arm.motors, mismatch.motor_friction), torque_constant=constants),
-        joints=_with_friction(arm.joints, mismatch.joint_friction),
-        links=_scaled_links(arm, mismatch),
+        motors=_scaled(motors, mismatch.motor_friction, *FRICTION),
+        joints=_scaled(arm.joints, mismatch.joint_friction, *FRICTION),
+        links=_scaled(arm.links, mismatch.mass, "mass", "inertia", "product"),
         payload=arm.payload + mismatch.payload,
-        cables=dataclasses.replace(arm.cables, stage_ea=_scaled(arm.cables.stage_ea, stages)),
+        cables=_scaled(arm.cables, stages, "stage_ea"),
     )
 
 
-def _scaled(values: Sequence[float], factors: Sequence[float]) -> tuple[float, ...]:
-    return tuple(value * factor for value, factor in zip(values, factors, strict=True))
-
-
-def _with_friction(shafts: Shafts, factors: Sequence[float]) -> Shafts:
-    return dataclasses.replace(
-        shafts,
-        static_friction=_scaled(shafts.static_friction, factors),
-        dynamic_friction=_scaled(shafts.dynamic_friction, factors),
-        viscous_friction=_scaled(shafts.viscous_friction, factors),
-    )
-
-
-def _scaled_links(arm: Arm, mismatch: ModelMismatch) -> Links:
-    links, of_elements = arm.links, [factor for factor in mismatch.mass for _ in range(3)]
-    return dataclasses.replace(
-        links,
-        mass=_scaled(links.mass, mismatch.mass),
-        inertia=_scaled(links.inertia, of_elements),
-        product=_scaled(links.product, of_elements),
-    )
+def _scaled(part: Part, factors: Sequence[float], *lists: str) -> Part:
+    """A part with other values in some of its lists, which have one or several for each factor."""
+    found = {}
+    for name in lists:
+        values = getattr(part, name)
+        width = len(values) // len(factors)
+        found[name] = tuple(value * factors[i // width] for i, value in enumerate(values))
+    return dataclasses.replace(part, **found)

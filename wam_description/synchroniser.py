@@ -152,9 +152,8 @@ class Synchroniser:
 
     def accepts(self, topic: str, stamp: int) -> bool:
         """Whether a message of this stamp can be part of a step; if not, it need not be decoded."""
-        if topic == self._trigger:
-            return not self._thinned or stamp % self._outer_period == self._outer_phase
-        return not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase
+        is_thinned = self._thinned if topic == self._trigger else self._outer and topic not in self._newest
+        return not is_thinned or stamp % self._outer_period == self._outer_phase
 
     def _waited(self, topic: str, group: "_Group", waited: InputSpec) -> Inlet:
         """The inlet of an input that steps wait for."""
