@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -88,34 +87,22 @@ def unwritable(path: Path) -> str:
     return ""
 
 
-@dataclass(frozen=True)
-class OutputFile:
+def output_file(kind: str, suffixes: Sequence[str], heading: str = "") -> Callable[[str], Path]:
     """The type of a file that is written: refused before the work if it could not be written, or should not be.
 
-    Attributes
+    Parameters
     ----------
     kind : what is written, as messages have it.
     suffixes : that it may have, in lower case.
     heading : how those begin that this program wrote; others are not written over.  '' where any may be.
     """
 
-    kind: str
-    suffixes: tuple[str, ...]
-    heading: str = ""
-
-    def __call__(self, text: str) -> Path:
-        """The file; the reason where it is refused."""
+    def parse(text: str) -> Path:
         file = Path(text)
-        if reason := self._obstacle(file):
-            raise argparse.ArgumentTypeError(reason)
-        return file
-
-    def _obstacle(self, file: Path) -> str:
-        folder, suffix = file.parent, file.suffix.lower()
-        if suffix not in self.suffixes:
-            allowed = ", ".join(filter(None, self.suffixes))
-            return f"{file} cannot be {self.kind}; give a file that ends in {allowed}"
-        why = ""
+        folder, why = file.parent, ""
+        if file.suffix.lower() not in suffixes:
+            allowed = ", ".join(filter(None, suffixes))
+            raise argparse.ArgumentTypeError(f"{file} cannot be {kind}; give a file that ends in {allowed}")
         if file.is_dir():
             why = "it is a directory"
         elif not folder.is_dir():
@@ -123,20 +110,22 @@ class OutputFile:
         elif not os.access(file if file.exists() else folder, os.W_OK):
             why = f"no permission to write {'it' if file.exists() else f'into {folder}'}"
         if why:
-            return f"cannot write {file}: {why}; give another file"
-        if self.heading and file.exists():
+            raise argparse.ArgumentTypeError(f"cannot write {file}: {why}; give another file")
+        if heading and file.exists():
             there = file.read_text(encoding="utf-8", errors="replace")
-            if there.strip() and not there.startswith(self.heading):
-                return f"{file} exists, and this command did not write it; give a new file"
-        return ""
+            if there.strip() and not there.startswith(heading):
+                raise argparse.ArgumentTypeError(f"{file} exists, and this command did not write it; give a new file")
+        return file
+
+    return parse
 
 
 # '' is for devices and pipes, as /dev/stdout
-TABLE = OutputFile("a table", (".csv", ".tsv", ".txt", ".dat", ""))
-JSON = OutputFile("JSON", (".json", ".txt", ""))
-HTML = OutputFile("a page of HTML", (".html", ".htm", ""))
-PAGE = OutputFile("a page of the documentation", (".md",))
-PICTURE = OutputFile("a picture", (".png", ".pdf", ".svg", ".jpg", ".eps"))
+TABLE = output_file("a table", (".csv", ".tsv", ".txt", ".dat", ""))
+JSON = output_file("JSON", (".json", ".txt", ""))
+HTML = output_file("a page of HTML", (".html", ".htm", ""))
+PAGE = output_file("a page of the documentation", (".md",))
+PICTURE = output_file("a picture", (".png", ".pdf", ".svg", ".jpg", ".eps"))
 
 
 # groups

@@ -20,10 +20,10 @@ from wam_bag.bag_name import dated
 from wam_cli.options import (
     SEED,
     YAML_SUFFIXES,
-    OutputFile,
     bounded,
     configuration_file,
     configuration_of,
+    output_file,
     recording_folder,
     require_option,
     take_arm,
@@ -40,8 +40,8 @@ from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 
 HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
-MODEL = OutputFile("a configuration", YAML_SUFFIXES, MODEL_HEADING)
-MOVES = OutputFile("a scenario", YAML_SUFFIXES, HEADING)
+MODEL = output_file("a configuration", YAML_SUFFIXES, MODEL_HEADING)
+MOVES = output_file("a scenario", YAML_SUFFIXES, HEADING)
 TOPICS = ("motor_states", "status", *LOADS)
 
 
