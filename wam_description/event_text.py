@@ -34,7 +34,6 @@ PINNED: Final = (
     "give the contact position (contact_position in a scenario, r x F as torque in force_command, or "
     "contact_source=pinned)"
 )
-RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly"
 EXCESS: Final = "{quantity} is {value:b} {unit}, above its limit of {allowed:g} {unit}{where}"
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": (
@@ -125,7 +124,7 @@ SENTENCES: Final = {  # by cause
     "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but it has been at {measured:.4g} {unit} for {time:b} s; "
     "allowed error: {allowed:.2g} {unit}; perhaps something is in the way, a joint is at its end, or the arm cannot "
     "move in this direction here",
-    "speed": RAISE,
+    "speed": "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly",
     "torques_differ": "the torques do not fit a force at {position:.3g} m along {cover} (chi^2 {chi2:.3g}, allowed: "
     "{allowed:g}); perhaps it acts elsewhere{hidden}, or a second force acts; correct the contact position{dither}, or "
     "free the arm",
@@ -162,9 +161,6 @@ SENTENCES: Final = {  # by cause
 LESS: Final = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
 LOADED: Final = "declare the load (arm.payload); if the tool carries none, "  # else the model is wrong
 TURNED: Final = "a force in the frame of a link turns with it"
-HIDDEN: Final = {  # by what measures the force: what else may explain the torques, and what to do about it
-    "motors": (", friction of motors at rest hides a part of it", ", use the dither (timing.dither_cycle=40)")
-}
 SINCE: Final = ("without reaching it", "since the force was last within its tolerance")
 REACH: Final = (
     "nothing is touched; bring the arm to the surface first, or command more force",
@@ -235,7 +231,8 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
         "calm": CALM["motors" in source],
         "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,
         "lamps": f" (the pendant shows a fault of the {detail}{FAST * ('velocity' in detail)})" if detail else "",
-        **dict(zip(("hidden", "dither"), HIDDEN.get(source, ("", "")), strict=True)),
+        "hidden": ", friction of motors at rest hides a part of it" * (source == "motors"),
+        "dither": ", use the dither (timing.dither_cycle=40)" * (source == "motors"),
         "model": LOADED * (values.get("part") == "payload") + "run 'wam identify'",
     }
     if values.get("part") in PARTS:
