@@ -363,21 +363,22 @@ def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
 
 def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping[str, Any]]:
     """Flat sections of a parameter file; `whole` where it must have the shared one, as its last."""
-    if isinstance(tree, dict) and SCENARIO_KEY in tree:
+    keys = list(tree) if isinstance(tree, dict) else []
+    if SCENARIO_KEY in keys:
         raise ParameterError(
             f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path}', "
             "or set scenario:script to it"
         )
-    if isinstance(tree, dict) and (near := [key for key in tree if difflib.get_close_matches(str(key), [BASE])]):
+    if near := [key for key in keys if difflib.get_close_matches(str(key), [BASE])]:
         raise ParameterError(f"{path} has the key '{near[0]}'; did you mean '{BASE}'?")
-    if not isinstance(tree, dict) or (whole and SHARED not in tree):
+    if not isinstance(tree, dict) or (whole and SHARED not in keys):
         raise ParameterError(
             f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top level, or "
             f"'{BASE}: wam' if it only changes another configuration"
         )
-    if whole and list(tree)[-1] != SHARED:
+    if whole and keys[-1] != SHARED:
         raise ParameterError(
-            f"{path}: section '{list(tree)[-1]}' comes after '{SHARED}'; make '{SHARED}' the last one, "
+            f"{path}: section '{keys[-1]}' comes after '{SHARED}'; make '{SHARED}' the last one, "
             "otherwise ROS prefers the file to values given on a command line"
         )
     sections = {}

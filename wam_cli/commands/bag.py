@@ -9,8 +9,7 @@ from wam_bag.bag_file import files
 from wam_bag.losses import PARAMETERS, RECORDING, Losses
 from wam_bag.repair import Repaired, repair
 from wam_cli.options import configuration_of, recording_folder, take_configuration, take_stack
-from wam_description.arm import Shared
-from wam_description.configuration import Configuration, option_values
+from wam_description.configuration import option_values
 from wam_description.interface import Interface
 from wam_description.parameters import values
 
@@ -64,17 +63,12 @@ def _record(given: argparse.Namespace) -> None:
         shared = stack.read_shared()
     nodes = [name for name in Interface(shared).names if name != RECORDER]
     print(f"the stack in /{given.namespace} runs in {shared.timing.mode}: {', '.join(nodes)}", flush=True)
-    with parameter_file(_of_stack(configuration, shared)) as file:
+    others = [entry for entry in shared.nodes if entry != RECORDER]  # this recorder is no part of the stack
+    with parameter_file(configuration.with_values({**values(shared), "nodes": others})) as file:
         where = f"__ns:=/{given.namespace}"
         arguments = ["wam", "--ros-args", "--params-file", str(file), "-r", where]
         if failure := run_node(node_makers([RECORDER]), arguments):
             raise SystemExit(f"error: {failure}")
-
-
-def _of_stack(configuration: Configuration, shared: Shared) -> Configuration:
-    """The configuration with the shared parameters of a running stack, of which this recorder is no part."""
-    nodes = [entry for entry in shared.nodes if entry != RECORDER]
-    return configuration.with_values({**values(shared), "nodes": nodes})
 
 
 def described(found: Bag) -> list[str]:
