@@ -89,12 +89,7 @@ EQUATIONS: tuple[Equation, ...] = (
     Equation("6.6", "6.2.3", "when kinetic energy is negligible", "its ratio to the loss is twice that"),
     Equation("6.7", "6.2.3", "when weight is negligible", "EA^2 is E A^2; ratio 1 is at 2535 in, not 275"),
     Equation("6.8", "6.2.4", "speed of a pulley to which the cable sticks at the entry"),
-    Equation(
-        "6.9",
-        "6.2.4",
-        "speed of a pulley to which the cable sticks at the exit",
-        "does not happen on the driven pulley, by (6.10.b)",
-    ),
+    Equation("6.9", "6.2.4", "speed of a pulley to which the cable sticks at the exit"),
     Equation("6.10", "6.2.4", "loss for either sticking point", "the last term is an artefact of (6.5)"),
     Equation("6.11", "6.2.4", "loss at the driven pulley"),
     Equation("6.12", "6.2.4", "loss at the drive pulley"),
