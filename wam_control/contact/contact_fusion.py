@@ -168,7 +168,9 @@ class ContactFusion:
         common = shared.dot(effects.T)
         places, chances = guess[:, 0], np.sqrt(guess[:, 1])
         found, count = len(places), len(past)
-        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
+        rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
+        for j, moment in enumerate(moments):
+            rows[:, :, j] = moment.rows
         sides, slopes = _sides(rows[:found, :, -1:], places)
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED

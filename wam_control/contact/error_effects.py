@@ -68,7 +68,10 @@ class GaugeEffects:
 
     def observation(self, motion: FilteredMotion, *_: object) -> Observation:
         """See `ErrorEffects.observation`."""
-        effects = np.hstack((np.diag(motion.model), self._links.of(motion.pose, self._still, self._still)))
+        n = len(motion.model)
+        effects = np.zeros((n, 4 * n + 1))
+        effects.ravel()[:: 4 * n + 2] = motion.model  # the diagonal
+        effects[:, n:] = self._links.of(motion.pose, self._still, self._still)
         residual = motion.residual - self._payload * effects[:, -1]
         moving = motion.signals  # there are none
         return Observation(residual, effects, self._rest, moving, motion.pose, self._lasting)
@@ -128,16 +131,15 @@ class ErrorEffects:
         )
         modelled = self._from_motors.T.dot(model)
         weights = self._links.body.gravity_torque(motion.pose)
-        constants = modelled[:, None] * self._differs - np.diag(self._from_motors.T.dot(residual))
-        effects = np.hstack(
-            (
-                self._errors * np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded)),
-                self._to_joints.dot(constants),
-                self._through * (-self._dynamic * slope),
-                self._to_joints.dot(signals[-n:])[:, None],
-                self._links.of(motion.pose, motion.velocity, motion.acceleration),
-            )
-        )
+        effects = np.zeros((n, 14 * n + 2))
+        sizes = np.concatenate((moving + sliding, moving - sliding, weights, model - weights, loaded))
+        np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
+        own = modelled[:, None] * self._differs
+        own.ravel()[:: n + 1] -= self._from_motors.T.dot(residual)  # the diagonal
+        effects[:, 8 * n : 9 * n] = self._to_joints.dot(own)
+        effects[:, 9 * n : 11 * n] = self._through * (-self._dynamic * slope)
+        effects[:, 11 * n] = self._to_joints.dot(signals[-n:])
+        effects[:, 11 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
         residual = residual - given.payload[0] * effects[:, -1]
         at_rest, shape = self._sds
         variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved

@@ -5,7 +5,6 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from operator import sub
 from typing import Final
 
@@ -16,7 +15,7 @@ from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import ErrorEffects, FilteredMotion, GaugeEffects, LinkEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
-from wam_control.contact.motor_side import JointSample, LinkMotion, MotorSide
+from wam_control.contact.motor_side import LinkMotion, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
@@ -150,16 +149,18 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(JointSample(position, velocity, effort, [], NO_SIGNALS, dt))
+            return self._update(position, velocity, effort, [], NO_SIGNALS, dt)
         if self._side.carries_nothing(state):
             self.reset()
             return True
         sample = self._side.take(state, dt + self._gap)
         self._gap = 0.0
-        return sample is None or self._update(sample)
+        return sample is None or self._update(*sample)
 
-    def _update(self, sample: JointSample) -> bool:
-        q, qd, tau, friction, signals, dt = sample
+    def _update(
+        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, dt: float
+    ) -> bool:
+        """Take a sample of the joints, see `JointSample`."""
         body, at, speed, last = self.body, np.array(q), np.array(qd), self._last
         span, inertia, links = dt + self._gap, body.mass_matrix(at), None
         if self._is_link_side:
@@ -270,7 +271,6 @@ def _low_pass(before: list[float], present: list[float], keep: float) -> list[fl
     return [keep * old + take * new for old, new in zip(before, present)]  # noqa: B905 - as above
 
 
-@dataclass
 class _Sample:
     """The last sample that was taken.
 
@@ -284,13 +284,18 @@ class _Sample:
     links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
-    q: list[float]
-    qd: list[float]
-    momentum: list[float]
-    inertia: Array
-    known: list[float]
-    bias: list[float]
-    links: LinkMotion | None
+    def __init__(
+        self,
+        q: list[float],
+        qd: list[float],
+        momentum: list[float],
+        inertia: Array,
+        known: list[float],
+        bias: list[float],
+        links: LinkMotion | None,
+    ) -> None:
+        self.q, self.qd, self.momentum, self.inertia = q, qd, momentum, inertia
+        self.known, self.bias, self.links = known, bias, links
 
 
 class _Filters:

@@ -170,7 +170,7 @@ class ForceAxes:
         """The same with rotors: what hits a surface."""
         return self.inertia(q) + self._rotors
 
-    def dry_friction(self, velocity: Sequence[float]) -> Array:
+    def dry_friction(self, velocity: Sequence[float]) -> list[float]:
         """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
 
         Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
@@ -180,7 +180,7 @@ class ForceAxes:
         turning = zip(arm.motors.dynamic_friction, self._map.motor_velocities(velocity), strict=True)
         turned = self._map.joint_torques([most * math.tanh(speed / FORCE.slow_motor) for most, speed in turning])
         moved = zip(arm.joints.dynamic_friction, velocity, turned, strict=True)
-        return np.array([torque + most * math.tanh(speed / FORCE.slow_joint) for most, speed, torque in moved])
+        return [torque + most * math.tanh(speed / FORCE.slow_joint) for most, speed, torque in moved]
 
     def friction_damping(self, q: Angles, motion: Phasors, frequency: float) -> Array:
         """Damping of the joints (n,), N m s/rad, that takes as much energy as their dry friction: 4 F/(pi w |x|).

@@ -65,7 +65,7 @@ class CommandAdmission:
         if posture is not None and (beyond := self._joints.beyond(posture)):
             self._refuse("joint_posture_command", f"{beyond}; the last good posture remains in use")
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
-        self._refuse_without_effect(own.mode, given._replace(command=force, posture=posture))
+        self._refuse_without_effect(own.mode, given, force, posture)
         posture = None if self._is_ignored else posture
         has_ended = force is None and bool(_size(before))  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
@@ -78,14 +78,15 @@ class CommandAdmission:
     def _refuse(self, topic: str, reason: str) -> None:
         self.refusals[topic] = refused(topic, reason)
 
-    def _refuse_without_effect(self, mode: str, given: ForceInput) -> None:
+    def _refuse_without_effect(
+        self, mode: str, given: ForceInput, force: ForceCommand | None, posture: Sequence[float] | None
+    ) -> None:
         """Refuse what has no effect in this mode, or with this task: a force, a posture that moves, a torque."""
-        joints, task, posture = len(self._joints.names), given.task, given.posture
+        joints, task, q = len(self._joints.names), given.task, given.joints.position
         is_of_posture = mode == "hybrid" if task is None else len(task.axes) < joints
-        moves = posture is not None and (self._is_ignored or self._moves(posture, given.joints.position))
-        self._is_ignored = moves and not is_of_posture
+        self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture, q))
         useless = (
-            ("force_command", task is not None and bool(_size(given.command))),
+            ("force_command", task is not None and bool(_size(force))),
             ("joint_posture_command", self._is_ignored),
             ("joint_torque_command", given.torque is not None),
         )

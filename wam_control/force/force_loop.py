@@ -37,7 +37,6 @@ from wam_control.force.limits import (
     servo_yielding,
 )
 from wam_control.force.problem import VelocityRow, solve, unlimited
-from wam_control.force.stability_guard import triple
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
@@ -181,7 +180,7 @@ class ForceLoop:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(self._q)))
             self.events = ()
             return ForceOutput([], effort.tolist(), frame=self._run.frame)
-        if admitted.posture != given.posture:
+        if given.rate and admitted.posture != given.posture:
             given = given._replace(rate=None)
         found = self._watch(given) if self._run.axes else []
         if given.task is not None and (reason := beyond(given.task, own)):
@@ -318,7 +317,8 @@ class ForceLoop:
         fed = run.fed_forward(holds, own)
         if forces and not holds and own.friction_feedforward and not own.is_estimated:
             countered = sensing.dry_friction(velocity.tolist())
-            fed += own.friction_feedforward * run.friction.step(countered, FORCE.friction_time, dt)
+            friction = run.friction.step(countered, FORCE.friction_time, dt)
+            fed += own.friction_feedforward * np.array(friction)
         return velocity, fed.tolist(), limits
 
     def _towards(self, goal: Array, rate: Sequence[float] | None = None) -> Array:
@@ -480,13 +480,15 @@ class ForceLoop:
         return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
 
     def _output(self, velocity: Array, effort: list[float], is_task: bool) -> ForceOutput:
-        each, sums = self._run.axes, np.zeros((3, 3))
+        measured = error = limited = ZERO
+        each = self._run.axes
         for one in each:
             axis, known = one.now, one.known
             if axis.is_force and axis.sensed is not None:
                 law, off = self.supervision.force_law.along(axis.in_frame.tolist()), axis.desired - known.force
-                sums += np.outer([known.force, off, law.limited(0, off)], axis.in_frame)
-        measured, error, limited = map(triple, sums)
+                measured = _added(measured, known.force, axis.in_frame)
+                error = _added(error, off, axis.in_frame)
+                limited = _added(limited, law.limited(0, off), axis.in_frame)
         return ForceOutput(
             velocity.tolist(),
             effort,
@@ -522,6 +524,11 @@ def by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
     """One event of each subject, those that stop the arm first, then in the order of the codes."""
     each = {event.subject: event for event in found}
     return tuple(sorted(each.values(), key=lambda event: (not event.holds, event.code.number)))
+
+
+def _added(sum_before: Triple, size: float, direction: Array) -> Triple:
+    (a, b, c), (x, y, z) = sum_before, direction.tolist()
+    return a + size * x, b + size * y, c + size * z
 
 
 def _row(one: AxisRun) -> AxisRow:

@@ -24,12 +24,13 @@ class LowPass:
     """
 
     def __init__(self) -> None:
-        self.value = np.zeros(0)
+        self.value = list[float]()
 
-    def step(self, value: Array, time_constant: float, dt: float) -> Array:
+    def step(self, value: Sequence[float], time_constant: float, dt: float) -> list[float]:
         """Filtered values; `time_constant` and `dt` in s."""
-        before = self.value if self.value.size else value
-        self.value = before + (value - before) * (dt / (dt + time_constant))
+        share = dt / (dt + time_constant)
+        each = zip(self.value or value, value, strict=True)
+        self.value = [before + (now - before) * share for before, now in each]
         return self.value
 
 
@@ -68,7 +69,7 @@ class ForceMeasurement:
         self.free = self._external = self._none
         self._q: Sequence[float] = ()
         self._torque_sd = self._none
-        self._velocity = np.zeros(0)
+        self._velocity = list[float]()
         self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
         self.rested, self.speed = 0.0, math.inf
         self.restart()
@@ -90,19 +91,18 @@ class ForceMeasurement:
         """
         dt, torque = given.dt, self._torque(own, given)
         self._q, self._torque_sd = given.joints.position, self._none + own.sensing_fed_back.torque_sd
-        speeds = self._speed.step(np.array(given.joints.velocity), FORCE.steady_time, dt)
-        self.speed = float(np.abs(speeds).max())
+        self.speed = max(map(abs, self._speed.step(given.joints.velocity, FORCE.steady_time, dt)))
         self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
-        self._steady.step(torque, FORCE.steady_time, dt)
+        self._steady.step(torque.tolist(), FORCE.steady_time, dt)
         self._external = torque - self._zeros
-        is_first = not self._filter.value.size
+        is_first = not self._filter.value
         counted = self._external if is_touched or not own.is_estimated else self._none
-        now = self._filter.step(counted, own.force_filter, dt)
-        velocity = self._none if given.sensors is None else np.array(given.sensors.velocity)
-        before = self._velocity if self._velocity.size else velocity
-        filtered = self._acceleration.step((velocity - before) / dt, own.force_filter, dt)
+        now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
+        velocity = [0.0] * len(self._none) if given.sensors is None else given.sensors.velocity
+        change = [(new - old) / dt for new, old in zip(velocity, self._velocity or velocity, strict=True)]
+        filtered = self._acceleration.step(change, own.force_filter, dt)
         self._velocity = velocity
-        acceleration = filtered if own.feedback == "joint_sensors" else None
+        acceleration = np.array(filtered) if own.feedback == "joint_sensors" else None
         sd = np.array(given.external_sd) if own.is_estimated and given.external_sd else self._torque_sd
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
 
@@ -137,11 +137,11 @@ class ForceMeasurement:
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
-        return self._steady.value - self._zeros
+        return np.array(self._steady.value) - self._zeros
 
     def zero(self, limit: float) -> None:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m."""
-        found = self._steady.value - self._tare.at(self._body, self._q)
+        found = np.array(self._steady.value) - self._tare.at(self._body, self._q)
         if float(np.abs(found).max()) <= limit:
             self._zero = self._taken(found)
             self.free = self._zeros

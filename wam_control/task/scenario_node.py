@@ -64,7 +64,8 @@ class ScenarioNode:
             return self._end(f"step '{self._step}': {BRAKED}")
         step, force = out.step, out.force
         settings = step.settings if out.begins else ()
-        self._request(out, settings)
+        if out.request or settings or out.done:
+            self._request(out, settings)
         outputs: dict[str, Any] = {
             "joint_posture_command": State(out.posture, list(out.rate), []),
             "force_command": Wrench(force.frame, force.force, force.torque),
