@@ -145,7 +145,9 @@ class ModelErrors:
     def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
         """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
-        k, covariance = len(self.errors), np.eye(len(effects[0]))
+        k, size = len(self.errors), len(effects[0])
+        covariance = np.zeros((size, size))
+        covariance.ravel()[:: size + 1] = 1.0  # the diagonal
         covariance[:k, :k] = self.covariance
         return effects, self.size * covariance, self.size * self._with_noise(seen.rest, seen)
 

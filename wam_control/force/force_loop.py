@@ -323,9 +323,9 @@ class ForceLoop:
 
     def _towards(self, goal: Array, rate: Sequence[float] | None = None) -> Array:
         """Velocities (n,), rad/s, towards joint angles (n,), rad, that move at a rate (n,), rad/s."""
-        own, most = self.parameters, self.parameters.joint_speed_limit
-        wanted = own.posture_gain * (goal - self._pose) + np.array(rate or 0.0)
-        return np.minimum(np.maximum(wanted, -most), most)
+        gain, most = self.parameters.posture_gain, self.parameters.joint_speed_limit
+        each = zip(goal.tolist(), self._q, rate or [0.0] * len(self._q), strict=True)
+        return np.array([min(max(gain * (angle - at) + speed, -most), most) for angle, at, speed in each])
 
     def _hold_at(self, found: Sequence[Event], contact: Contact) -> Array:
         """Where the arm is to hold (n,), rad: here, or off another link, on from where it last was free."""
@@ -455,7 +455,10 @@ class ForceLoop:
             each = zip(self._body.arm.joints.names, self._admission.posture, rates, self._q, strict=True)
             moving = [(name, "rad", goal, speed, at, *law) for name, goal, speed, at in each]
         lasting = FORCE.quarter * own.limits.settling_time
-        events = [run.motions[i].step(*one, lasting, given.dt) for i, one in enumerate(moving)]
+        events = [
+            run.motions[i].step(name, unit, goal, speed, at, gain, fastest, lasting, given.dt)
+            for i, (name, unit, goal, speed, at, gain, fastest) in enumerate(moving)
+        ]
         return [event for event in events if event]
 
     def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
