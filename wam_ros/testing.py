@@ -31,7 +31,7 @@ from wam_ros.limits import TEST_LIMITS
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
-from wam_ros.wire import decoder, requirement, stamp_in
+from wam_ros.wire import decoder, deserialized, requirement, stamp_in
 
 _EMPTY: Final[Mapping[str, Any]] = {
     JOINT_STATE: State([], [], []),
@@ -195,10 +195,17 @@ class RunningArm:
         return self._recorded
 
     def newest(self, topic: str) -> Any:
-        """The newest message of a topic as a value, None before the first; cheaper than `recorded` in a condition."""
+        """The newest value of a topic, or message of one that no step takes; None before the first.
+
+        In a condition it is cheaper than `recorded`.
+        """
         row, data = self._row(topic), self.recorded.data[topic]
+        if not data:
+            return None
         try:
-            return decoder(row, self.configuration.shared, ANY)(data[-1]) if data else None
+            if row.is_replayed:
+                return decoder(row, self.configuration.shared, ANY)(data[-1])
+            return deserialized(data[-1], message_type(row), row.type)
         except Refused as reason:
             raise ArmFault(f"{' and '.join(self.interface.publishers(topic))} published {topic}: {reason}") from None
 

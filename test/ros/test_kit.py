@@ -150,6 +150,7 @@ def test_a_posture_without_a_stamp_counts_as_now_and_the_status_says_so(arm: Run
         sender.publish(encode(0, arm.value(topic, position=goal)))
         arm.run(0.005)
     assert arm.truth.q[2] > goal[2] - 0.05
+    assert arm.newest("contact/in_contact").data is False
     assert (arm.status("force_loop").level, arm.status("force_loop").facts["unstamped"]) == (Level.WARN, topic)
     arm.run_until(lambda: arm.status("force_loop").level is Level.OK)
 
