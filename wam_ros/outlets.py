@@ -45,7 +45,7 @@ class Outlets:
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
         }
         self._encoders = {row.name: encoder(row, node.shared) for row in rows}
-        self._write = {name: publisher.handle.publish_raw for name, publisher in self._publishers.items()}
+        self._write = {row.name: self._publishers[row.name].handle.publish_raw for row in rows}
         self.published = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
         bus, most = self.bus, waiting(node.shared.timing)
@@ -60,7 +60,7 @@ class Outlets:
             here(stamp, Sent(value, data))
 
     def send(self, topic: str, message: Any) -> None:
-        """Publish a message, or its bytes."""
+        """Publish a message on a topic of every node."""
         self.published[topic] += 1
         self._publishers[topic].publish(message)
 

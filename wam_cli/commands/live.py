@@ -130,25 +130,28 @@ def page_next_to(
     """
     with ExitStack() as ending:
         if given.live is not False:
-            port = free_port(given.port, _print)
-            reason = obstacle(port)
-            if reason and given.live:
-                raise NoPageError(reason)
-            if reason:
-                _print(f"no live page: {reason}")
-            else:
-                from wam_ros.bring_up import CommandProcess
-
-                # a process of its own can neither delay nor fail the stack
-                page = CommandProcess(["live", "--port", str(port), "--namespace", namespace], stdin=subprocess.DEVNULL)
-                ending.callback(_end, page)
-                late = time.monotonic() + LATE
-                while page.poll() is None and port_is_free(port) and not is_stopped():
-                    if time.monotonic() > late:
-                        _print(f"the live page is still starting; it will be at {url(port)}")
-                        break
-                    time.sleep(0.05)
+            _start_page(given, namespace, is_stopped, ending)
         yield ending.close
+
+
+def _start_page(given: argparse.Namespace, namespace: str, is_stopped: Callable[[], bool], ending: ExitStack) -> None:
+    port = free_port(given.port, _print)
+    if reason := obstacle(port):
+        if given.live:
+            raise NoPageError(reason)
+        _print(f"no live page: {reason}")
+        return
+    from wam_ros.bring_up import CommandProcess
+
+    # a process of its own can neither delay nor fail the stack
+    page = CommandProcess(["live", "--port", str(port), "--namespace", namespace], stdin=subprocess.DEVNULL)
+    ending.callback(_end, page)
+    late = time.monotonic() + LATE
+    while page.poll() is None and port_is_free(port) and not is_stopped():
+        if time.monotonic() > late:
+            _print(f"the live page is still starting; it will be at {url(port)}")
+            return
+        time.sleep(0.05)
 
 
 def _end(page: Any) -> None:

@@ -43,7 +43,7 @@ class Transform:
         if self._losses:
             for i, (angle, before) in enumerate(zip(theta, self._before or theta, strict=True)):
                 self._creep[i] += self._losses[i] * abs(angle - before) * motors.effort[i]
-            self._before = theta
+            self._before = list(theta)  # the caller may change it
             angles = [angle - crept for angle, crept in zip(theta, self._creep, strict=True)]
         return State(
             self._map.joint_positions(angles),
