@@ -221,7 +221,7 @@ def joint_names(names: Sequence[str], width: int) -> tuple[str, ...]:
     Parameters
     ----------
     names : as the message has them.
-    width : values of its longest field.
+    width : its values.
     """
     found: list[str] = []
     for i, name in enumerate([*names, *[""] * (width - len(names))]):
@@ -230,16 +230,18 @@ def joint_names(names: Sequence[str], width: int) -> tuple[str, ...]:
     return tuple(found)
 
 
-def irregularities(names: Sequence[str], widths: Mapping[str, int]) -> Iterator[str]:
-    """What is wrong with the names of a message and the lengths of its fields."""
-    most = max(len(names), *widths.values())
+def irregularities(names: Sequence[str], widths: Mapping[str, int], number: int) -> Iterator[str]:
+    """What is wrong with the names of a message of so many joints and the lengths of its fields."""
     if not any(widths.values()):
         yield "no value"
-    if not all(names) or len(names) < most:
+    named = [*filter(None, names)]
+    if len(named) < number:
         yield UNNAMED
-    if len(set(filter(None, names))) < len([*filter(None, names)]):
+    if len({*named}) < len(named):
         yield DOUBLED
-    yield from (f"{field} of another length than the names" for field, width in widths.items() if 0 < width < most)
+    yield from (
+        f"{field} of another length than the names" for field, width in widths.items() if width not in (0, number)
+    )
 
 
 def joint_columns(times: Times, groups: list[Any]) -> JointColumns:
@@ -254,16 +256,19 @@ def joint_columns(times: Times, groups: list[Any]) -> JointColumns:
     owners = []
     for _, (stamps, _, given, fields) in groups:
         widths = {name: field.shape[1] for name, field in zip(JOINT_FIELDS, fields, strict=True)}
-        irregular.update({what: len(stamps) for what in irregularities(given, widths)})
-        owners.append(joint_names(given, max(widths.values())))
+        # as many joints as most of its lists have that are not shorter than that of the names
+        lengths = [len(given), *widths.values()]
+        number = max(lengths, key=lambda n: (n >= max(lengths[0], 1), lengths.count(n), n))
+        irregular.update({what: len(stamps) for what in irregularities(given, widths, number)})
+        owners.append(joint_names(given, number))
     names = tuple(dict.fromkeys(name for own in owners for name in own))
     arrays = []
     for place in range(len(JOINT_FIELDS)):
-        is_there = any(values[3][place].size for _, values in groups)
-        array = np.full((len(times), len(names) if is_there else 0), np.nan)
+        width = len(names) * any(values[3][place].size for _, values in groups)
+        array = np.full((len(times), width), np.nan)
         for (where, (_, _, _, fields)), own in zip(groups, owners, strict=True):
             values = fields[place]
-            if values.shape[1] < len(own):
+            if values.shape[1] != len(own):
                 continue
             if own == names:
                 array[where] = values

@@ -191,7 +191,7 @@ def names() -> list[Case]:
         return {f"{a}: frequency": 0.7, f"{b}: frequency": 1.9,
                 f"{a}, 0.7 Hz: amplitude": 0.3, f"{b}, 1.9 Hz: amplitude": 0.1}  # fmt: skip
 
-    short = [s._replace(fields=s.fields | {"effort": [1.0]}) for s in called("x", "y")]
+    short, long = ([s._replace(fields=s.fields | {"effort": n * [1.0]}) for s in called("x", "y")] for n in (1, 3))
     given = topic_map([], ["p", "q"], [], [], [])
     return [
         Case("none", by_mcap_ros2, called(), numbers("joint1", "joint2"), "without a name"),
@@ -200,6 +200,7 @@ def names() -> list[Case]:
         Case("one of two", sqlite, called("x"), numbers("x", "joint2"), "without a name"),
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
+        Case("long effort", by_rosbags, long, numbers("x", "y"), "effort of another length than the names"),
         Case("nothing now and then", ros1, without(called("x", "y"), lambda i: i % 9 == 4, "position"),
              numbers("x", "y"), "messages with no value"),
     ]  # fmt: skip

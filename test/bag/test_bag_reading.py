@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import multimode
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,8 @@ def xyz(vectors: Sequence[Any]) -> np.ndarray[Any, Any]:
 
 def named(message: Any) -> list[str]:
     """Names of a message's values: numbered where there is none, or where another value has it."""
-    width = max(len(message.name), *(len(getattr(message, field)) for field in ("position", "velocity", "effort")))
+    lengths = [len(getattr(message, field)) for field in ("name", "position", "velocity", "effort")]
+    width = max(multimode(n for n in lengths if n >= max(lengths[0], 1)), default=0)
     found: list[str] = []
     for i in range(width):
         name = (message.name[i] if i < len(message.name) else "") or f"joint{i + 1}"
