@@ -4,13 +4,13 @@ import csv
 import math
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from foreign_bags import CONTROLLER, INTERFACES, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
+from foreign_bags import CONTROLLER, INTERFACES, JOINTS, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
@@ -110,6 +110,7 @@ def sparse() -> list[Case]:
         ("every other", by_rosbags, 100.0, lambda i: i % 2, ("velocity", "effort"), 1500),
         ("three of four", sqlite, 200.0, lambda i: i % 4, ("velocity", "effort"), 1500),
         ("effort alone", ros1, 125.0, lambda i: i % 3 == 1, ("effort",), 2500),
+        ("left out in JSON", partial(by_json, kind=JOINTS), 100.0, lambda i: i % 3 != 1, ("velocity", "effort"), 1000),
         ("velocity alone", by_mcap_ros2, 80.0, lambda i: i % 5 == 0, ("velocity",), 1920),
     ]
     return [

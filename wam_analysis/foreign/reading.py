@@ -1,7 +1,8 @@
 """Bags of other robots as columns of joints and wrenches."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -55,10 +56,10 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
     if missing := [name for name in named if name not in bag.topics]:
         listed = ", ".join(sorted(bag.counts)) or "none"
         raise ValueError(f"{bag.path} has no topic {missing[0]}; its topics: {listed}")
-    first = {name: one.messages[0] for name, one in bag.topics.items() if isinstance(one, Messages) and one.messages}
-    for path in (path for paths in given.fields.values() for path in paths.split(",")):
-        if first and not any(_has(message, path) for message in first.values()):
-            _at(*next(iter(first.items())), path)  # raises what the messages have
+    every = [message for one in bag.topics.values() if isinstance(one, Messages) for message in one.messages]
+    for path in ",".join(given.fields.values()).split(","):
+        if every and path and not _has(every, path):
+            _at(", ".join(bag.topics), every[0], path)  # raises what the messages have
     topics: dict[str, Any] = {}
     types = dict(bag.types)
     for name, columns in bag.topics.items():
@@ -96,7 +97,7 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
     if isinstance(columns, (JointColumns, WrenchColumns)):
         yield topic, columns
     elif columns.messages:
-        for suffix, fields in _fields(kind, columns.messages[0], given):
+        for suffix, fields in _fields(kind, columns.messages, given):
             has_joints, has_wrench = any(q in fields for q in JOINT_FIELDS), "force" in fields or "torque" in fields
             if not has_joints and not has_wrench:
                 raise ValueError(f"{topic} is of type {kind}; name its fields, for example --map position=FIELD")
@@ -106,27 +107,27 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
                 yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, fields, given)
 
 
-def _fields(kind: str, message: Any, given: TopicMap) -> Iterable[tuple[str, Mapping[str, str]]]:
+def _fields(kind: str, messages: Sequence[Any], given: TopicMap) -> Iterable[tuple[str, Mapping[str, str]]]:
     """Suffixes of a topic, each with the fields by quantity: those that are given, else those of the type."""
     known = [
-        (suffix, {q: path for q, path in fields.items() if _has(message, path)})
+        (suffix, {q: path for q, path in fields.items() if _has(messages, path)})
         for suffix, fields in FIELDS.get(kind, ())
     ]
-    own = [(suffix, fields) for suffix, fields in known if fields.keys() - {"name"}]
+    own = [one for one in known if one[1].keys() - {"name"}]
+    mapped = {q: path for q, path in given.fields.items() if all(_has(messages, part) for part in path.split(","))}
     if not own:
-        return [("", given.fields)]
-    mapped = {q: path for q, path in given.fields.items() if all(_has(message, part) for part in path.split(","))}
+        return [("", mapped)]
     (suffix, first), *_ = own
     return [(suffix, first | {q: path for q, path in mapped.items() if q in (*first, "stamp")})] if mapped else own
 
 
-def _has(message: Any, path: str) -> bool:
-    """Whether a message has a field."""
-    try:
-        _at("", message, path)
-    except ValueError:
-        return False
-    return True
+def _has(messages: Iterable[Any], path: str) -> bool:
+    """Whether any of some messages has a field: in JSON others may leave it out."""
+    for message in messages:
+        with suppress(ValueError):
+            _at("", message, path)
+            return True
+    return False
 
 
 def _at(topic: str, message: Any, path: str) -> Any:
@@ -171,15 +172,14 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
 
 
 def _frames(columns: Messages) -> Texts:
-    found = (str(getattr(getattr(one, "header", 0), "frame_id", "")) for one in columns.messages)
-    return np.array([frame.removeprefix("/") for frame in found], object)
+    return np.array([str(getattr(getattr(one, "header", 0), "frame_id", "")) for one in columns.messages], object)
 
 
 def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
-    """The numbers at a path in each message; those of a vector are x, y, z."""
+    """The numbers at a path in each message, none where it has no such field; those of a vector are x, y, z."""
     found = []
     for message in columns.messages:
-        value = _at(topic, message, path)
+        value: Any = _at(topic, message, path) if _has([message], path) else ()
         if parts := {*getattr(value, "_fields", getattr(value, "__dict__", ()))}:
             value = [value.x, value.y, value.z] if parts == {*"xyz"} else ""  # not a quaternion
         try:
@@ -190,21 +190,21 @@ def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
 
 
 def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> JointColumns:
-    taken = {q: _numbers(topic, columns, fields[q]) for q in JOINT_FIELDS if q in fields}
+    taken = [_numbers(topic, columns, fields.get(q, "")) for q in JOINT_FIELDS]
     times, frames = _times(topic, columns, fields, given), _frames(columns)
     alike: dict[Any, list[int]] = {}  # rows by frame, names and lengths of the fields
     for k, message in enumerate(columns.messages):
-        widths = tuple(len(taken[q][k]) if q in taken else 0 for q in JOINT_FIELDS)
+        widths = tuple(len(numbers[k]) for numbers in taken)
         fitting = given.joints if len(given.joints) == max(widths) else ()
         named = _at(topic, message, fields["name"]) if "name" in fields else fitting
         names = tuple(map(str, np.atleast_1d(named).tolist()))  # a single one, and numbers of motors, too
         if 0 < len(names) < max(widths) and given.fields.items() & fields.items():
             raise ValueError(f"{topic} has {max(widths)} values for {len(names)} names in a message; map other fields")
         alike.setdefault((frames[k], names, widths), []).append(k)
-    groups = []
-    for (frame, names, _), rows in alike.items():
-        values = [np.array([taken[q][k] if q in taken else () for k in rows], np.float64) for q in JOINT_FIELDS]
-        groups.append((np.array(rows), (times[rows], frame, names, values)))
+    groups = [
+        (np.array(rows), (times[rows], frame, names, [np.array([numbers[k] for k in rows]) for numbers in taken]))
+        for (frame, names, _), rows in alike.items()
+    ]
     found = joint_columns(columns.log_time_ns, groups)
     return found if "name" in fields else found._replace(irregular={})
 
@@ -213,7 +213,7 @@ def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
     parts = []
     for quantity in ("force", "torque"):
         values = np.full((len(columns.messages), 3), np.nan)
-        for k, row in enumerate(_numbers(topic, columns, fields[quantity]) if quantity in fields else ()):
+        for k, row in enumerate(_numbers(topic, columns, fields.get(quantity, ""))):
             part = row[3:] if quantity == "torque" and len(row) == 6 else row[:3]
             values[k, : len(part)] = part
         parts.append(values)
