@@ -241,7 +241,7 @@ class StreamThresholds:
         4.0 * math.pi,
         360.0,
     )  # rad, after which an angle wraps; or degrees as rad
-    wraps: float = 0.75  # of a turn: a larger jump from message to message is a wrap
+    wraps: float = 0.75  # of the range of a counter: by more it jumps where it begins again
     alike: float = 3.0  # times the largest other step: in a wrap an angle moves by less than that
     within: float = 1.01  # of a turn, which an angle that wraps does not leave
     zero: float = 5.0  # times what the velocity usually leaves of a step of the position: more may move its zero

@@ -97,6 +97,7 @@ def wraps() -> list[Case]:
              sine(0.3, 2.5) | FRICTION, said),
         Case("a counter of 16 bits", by_mcap_ros2, one("/joint_states", 100.0, 0.3, 5e5, wrapped(-32768.0, 65536.0)),
              sine(0.3, 5e5), said),
+        Case("a wheel", sqlite, one("/joint_states", 10.0, 0.3, 10.0, wrapped(-math.pi)), sine(0.3, 10.0), said),
     ]  # fmt: skip
 
 

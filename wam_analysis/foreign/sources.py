@@ -409,14 +409,14 @@ def _overflow(position: Numbers) -> float:
 
 
 def _unwrapped(time: Numbers, position: Numbers, is_command: bool) -> tuple[Numbers, int, float]:
-    """An angle without its wraps, their number and the turn: it stays within a turn and jumps by nearly one."""
+    """An angle without its wraps, their number and the turn: it stays within a turn and jumps by more than half."""
     steps = np.diff(position)
     for turn in (*STREAM.turns, math.nan if is_command else _overflow(position)):  # a command may jump
-        jumps = (np.abs(steps) > STREAM.wraps * turn) & ~after_gaps(time)[1:]
+        jumps = (np.abs(steps) > 0.5 * turn) & ~after_gaps(time)[1:]
         if not np.any(jumps) or np.ptp(position) > STREAM.within * turn:
             continue
-        moved = turn - np.abs(steps[jumps])  # in a wrap as much as elsewhere
-        if np.median(np.abs(moved)) <= STREAM.alike * np.max(np.abs(steps[~jumps]), initial=0.0):
+        moved = turn - np.median(np.abs(steps[jumps]))  # in a wrap as much as elsewhere
+        if moved <= STREAM.alike * np.max(np.abs(steps[~jumps]), initial=0.0):
             return np.unwrap(position, period=turn), int(np.sum(jumps)), turn
     return position, 0, math.nan
 
