@@ -258,10 +258,13 @@ def called_as_commands() -> list[Case]:
 
 def few_cycles() -> list[Case]:
     fast = one("/js", 250.0, 0.15, 0.5, lambda q: q + 0.001 * np.sin(0.088 * math.pi * np.arange(len(q))), 20.0)
+    part = one("/js", 200.0, 0.15, 0.6, lambda q: q + 0.002 * np.sin(0.11 * math.pi * np.arange(len(q))) *
+               (np.arange(len(q)) // 3000 == 1), 60.0)  # fmt: skip
     lost = [s for s, kept in zip(fast, np.random.default_rng(3).random(len(fast)) > 0.15, strict=True) if kept]
     return [
         Case("beside a fast one", sqlite, without(fast, lambda _: True, "velocity", "effort"),
              {"a: frequency": 11.0, "a: cycle, peak to peak": 0.002}),
+        Case("in a part", sqlite, part, {"a from 15.0 s: frequency": 11.0, "a from 15.0 s: end": 30.0}),
         Case("with some lost", ros1, lost, {"a, 11 Hz: amplitude": 0.001}, "messages missing"),
         *(Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
                ("No vibration was found above", f"recording: {seconds:g} s"))

@@ -24,6 +24,7 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
 
     Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
     window or beyond it, and is evaluated between these ends.  A motion that decays or grows between them is none.
+    There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow motion.
 
     Parameters
     ----------
@@ -32,21 +33,20 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     least : peak to peak of the smallest cycle that is reported, above the noise.
     """
     n = length = len(value)
-    free = np.ones(n, dtype=np.bool_)
+    longest = np.full(n, n)  # window that is looked at
     found: list[Episode] = []
     transients: list[_Transient] = []
     while length >= min(CYCLE.window_samples, n):
         level = value - smoothed(value, length // CYCLE.slowest_cycles)
         for begin in range(0, n - length + 1, max(length // 2, 1)):
             rows = slice(begin, begin + length)
-            if not np.all(free[rows]):
+            if np.any(longest[rows] < length):
                 continue
             cycle = _cycle(time[rows], value[rows], least) or _cycle(time[rows], level[rows], least)
             if cycle is None:
                 continue
             flat = without_drift(time, value, cycle.period)
-            flat = without_drift(time, flat, cycle.period)  # what the first mean leaves of a strong slow motion
-            first, last = _extended(time, flat, rows, cycle.period, free)
+            first, last = _extended(time, flat, rows, cycle.period, longest >= length)
             lag = cycle.period / float(time[1] - time[0])
             edge = round(CYCLE.edge * lag)
             inner = slice(first + edge if first else 0, last - edge if last < n else n)
@@ -55,16 +55,21 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             period = _refined(time[inner], flat[inner], cycle.period)
             both = (_cycle(time[inner], signal[inner], least, period) for signal in (value, flat))
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
-            goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-            if goes_on or (better is None and _changes(time[inner], flat[inner], period)):
+            is_transient = (
+                _changes(time[inner], flat[inner], period)
+                if better is None
+                else any(one.goes_on(first, last, better) for one in transients)
+            )
+            if is_transient:
                 transients.append(_Transient(first, last, period, _width(time, period)))
+                lag = 0.0  # its last part is no limit cycle
             else:
                 if better is None:  # a step disturbs it elsewhere
                     if cycle.cycles < 4 * CYCLE.episode_cycles:
                         continue
                     first, last = begin, begin + length
                 found.append(Episode(float(time[first]), float(time[last - 1]), better or cycle))
-            free[first:last] = False  # the last part of a transient is no limit cycle
+            longest[first:last] = CYCLE.slowest_cycles * lag  # a faster one may be there
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
 
@@ -115,18 +120,21 @@ def _refined(time: Numbers, flat: Numbers, period: float) -> float:
 def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
     """A signal without what changes slowly: less its mean over exactly two periods, of which a cycle has none.
 
-    In the first and the last period the mean goes on as in the next: a window that ends there is not two periods long.
+    Then less that of the rest, as the first mean leaves some of a strong slow motion.  In the first and the last period
+    the mean goes on as in the next: a window that ends there is not two periods long.
     """
     half = period / float(time[1] - time[0])
     end = math.ceil(half)
-    total = np.concatenate([[0.0], np.cumsum(value)])
     middle = np.arange(end, len(value) - end) + 0.5
-    ends = (np.interp(middle + way * half, np.arange(len(total)), total) for way in (1.0, -1.0))
-    slow = (next(ends) - next(ends)) / (2.0 * half)
     away = np.arange(1, end + 1) / end
-    before = slow[0] - away[::-1] * (slow[end] - slow[0])
-    after = slow[-1] + away * (slow[-1] - slow[-1 - end])
-    return value - np.concatenate([before, slow, after])
+    for _ in range(2):
+        total = np.concatenate([[0.0], np.cumsum(value)])
+        ends = (np.interp(middle + way * half, np.arange(len(total)), total) for way in (1.0, -1.0))
+        slow = (next(ends) - next(ends)) / (2.0 * half)
+        before = slow[0] - away[::-1] * (slow[end] - slow[0])
+        after = slow[-1] + away * (slow[-1] - slow[-1 - end])
+        value = value - np.concatenate([before, slow, after])
+    return value
 
 
 def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: Mask) -> tuple[int, int]:
