@@ -203,6 +203,8 @@ def names() -> list[Case]:
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
         Case("long effort", by_rosbags, long, numbers("x", "y"), "effort of another length than the names"),
+        Case("effort of one", ros1, one("/js", 100.0, 0.7, 0.5) + called("x", "y"), FRICTION | numbers("x", "y"), "",
+             NOTHING, ("x: friction is not identified: no message has all of position, effort.",)),
         Case("nothing now and then", ros1, without(called("x", "y"), lambda i: i % 9 == 4, "position"),
              numbers("x", "y"), "messages with no value"),
     ]  # fmt: skip

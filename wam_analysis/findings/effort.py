@@ -25,7 +25,9 @@ def effort_section(recording: AnalysedRecording) -> Section:
     states = recording.states
     sentences, findings, brief, alone = [], [], [], []
     doubts, wrong = list[str](), list[str]()
-    for one in (one for one in states if one.is_joint and not rests(one)):
+    moving = [one for one in states if one.is_joint and not rests(one)]
+    powered = {one.name for one in moving if np.any(one.values.get("effort", 0.0))}
+    for one in moving:
         unlike = contradiction(one) or _limited(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
         found, lag = (Friction(), 0.0) if unlike else friction(one)
@@ -36,7 +38,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            if not unlike and np.any(one.values.get("effort", 0.0)) and len(one.values) > 1:
+            has_any = np.any(one.values.get("effort", one.name not in powered))
+            if powered and has_any and not unlike and one.values.keys() != {"effort"}:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue
@@ -79,8 +82,8 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
     """Which condition of an identified friction is not met."""
     if below := [number for number in numbers if number[2].is_negative]:
         return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
-    if not len(one.only(*one.values).time):
-        return f"no message has all of {', '.join(one.values)}"
+    if "effort" not in one.values or not len(one.only(*one.values).time):
+        return f"no message has all of {', '.join({**one.values, 'effort': 0})}"
     if math.isnan(numbers[0][2].value):
         part = f"it moved in one direction for more than {100.0 * (1.0 - SHAFT.both_ways):g} % of its way"
         return f"{part}, or for fewer than {SHAFT.fewest_samples} samples apart from its reversals"
@@ -162,7 +165,8 @@ def friction(source: Source) -> tuple[Friction, float]:
     period = some[0].period
     window = max(SHAFT.window, SHAFT.window_samples * period)
     most = math.ceil(CYCLE.longest_lag / period)
-    apart = 2 * round(window / period) + 2 * most + 2  # samples between two pieces
+    width = round(window / period)
+    apart = 2 * (width + most + 1)  # samples between two pieces
     blank = np.full(apart, math.nan)
     joined = {
         q: np.concatenate([part for piece in some for part in (piece.values[q], blank)])
@@ -180,16 +184,16 @@ def friction(source: Source) -> tuple[Friction, float]:
         """Friction with the effort of `shift` samples later, from the samples that may be used, all by default."""
         return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, use, loads)
 
-    width = round(window / period)
     own, noise, curve = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = bool(weight) and own < SHAFT.apart
-    found, shift = (fit(0), 0) if one_frequency else _best(fit, most)
+    most *= not one_frequency
+    found, shift = _best(fit, most)
     # where the effort is filtered, its step at a reversal is no delay; nor is one over a way before it slides
     near = math.ceil(SHAFT.filtered * SHAFT.longest_effort_lag / period)
     use = np.all([np.sign(velocity) == np.sign(np.roll(velocity, way)) for way in (near, -near)], axis=0)
     settled = fit(shift, use)
-    if _is_known(settled) and (shift or settled.residual < SHAFT.much_better * found.residual):
-        found, shift = (settled, shift) if one_frequency else _best(lambda lag: fit(lag, use), most)
+    if _is_known(settled) and (shift or settled.dynamic.error < found.dynamic.error):
+        found, shift = _best(lambda lag: fit(lag, use), most)
     doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
