@@ -168,8 +168,7 @@ def analyse_bag(
     """
     recording = AnalysedRecording(bag, namespace, given)
     if recording.is_foreign and not recording.sources:
-        why = " ".join(unread(bag)) or "nothing in it can be analysed: too few messages"
-        raise BagError(f"{bag.path}: {why}")
+        raise BagError(f"{bag.path}: too few messages of joints or forces. {' '.join(unread(bag))}".rstrip())
     made = []
     for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
         if (section := make(recording)) is not None:
