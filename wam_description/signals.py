@@ -1,6 +1,6 @@
 """The values that nodes exchange, without time stamps: the same on topics, in the simulation and in a replay."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from wam_description.event import Event, Level
@@ -20,6 +20,25 @@ class State(NamedTuple):
     position: list[float]
     velocity: list[float]
     effort: list[float]
+
+
+def mask(arrays: str) -> Callable[[Any], Any]:
+    """What copies the arrays of a JointState that an input takes, and leaves the others empty.
+
+    With a copy, a step that changes its input does not change that of another node.  Other values cannot be changed.
+    """
+    position, velocity, effort = (name in arrays.replace("?", "").split() for name in State._fields)
+
+    def masked(value: Any) -> Any:
+        if not isinstance(value, State):
+            return value
+        return State(
+            [*value.position] if position else [],
+            [*value.velocity] if velocity else [],
+            [*value.effort] if effort else [],
+        )
+
+    return masked
 
 
 class Wrench(NamedTuple):

@@ -254,25 +254,6 @@ def raised(error: Exception) -> str:
     return f"{text}, at {frames[-1].filename}:{frames[-1].lineno}" if frames else text
 
 
-def mask(arrays: str) -> Callable[[Any], Any]:
-    """What copies the arrays of a JointState that an input takes, and leaves the others empty.
-
-    With a copy, a step that changes its input does not change that of another node.  Other values cannot be changed.
-    """
-    position, velocity, effort = (name in arrays.replace("?", "").split() for name in State._fields)
-
-    def masked(value: Any) -> Any:
-        if not isinstance(value, State):
-            return value
-        return State(
-            [*value.position] if position else [],
-            [*value.velocity] if velocity else [],
-            [*value.effort] if effort else [],
-        )
-
-    return masked
-
-
 def needed_arrays(inputs: Sequence[str]) -> str:
     """The arrays of a JointState that several inputs of one topic take, with a '?' where none of them needs it."""
     taken = [arrays.split() for arrays in inputs]

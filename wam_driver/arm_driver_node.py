@@ -213,13 +213,14 @@ class ArmDriver(StackNode):
             self._mode = safety.mode
             session.since = self.stamp + self.shared.timing.period_ns
         problem, warnings = self.health.problem, self.warnings
-        reasons = [*dict.fromkeys(filter(None, (safety.fault, problem)))] or warnings
-        message = f"{safety.mode.value}: {'; '.join(reasons)}".removesuffix(": ")
-        reported = (message, self.health.is_ready, session.number, session.since, self.is_paused)
+        reasons = tuple(filter(None, (safety.fault, problem))) or warnings
+        state = safety.mode, reasons
+        reported = (state, self.health.is_ready, session.number, session.since, self.is_paused)
         if reported == self._reported:
             return
-        is_new_fault = bool(safety.fault) and message != self._reported[0]
+        is_new_fault = bool(safety.fault) and state != self._reported[0]
         self._reported = reported
+        message = f"{safety.mode.value}: {'; '.join(dict.fromkeys(reasons))}".removesuffix(": ")
         if is_new_fault:
             self.get_logger().error(message)
         self.health.publish(

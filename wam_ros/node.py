@@ -19,10 +19,10 @@ from wam_description.configuration import Configuration
 from wam_description.event import Code, Event, Level, fault
 from wam_description.event_text import news, sentence
 from wam_description.interface import Feed, declared
-from wam_description.signals import NodeStatus
+from wam_description.signals import NodeStatus, mask
 from wam_description.synchroniser import CURE, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
-from wam_description.wiring import Declaration, Inputs, Outputs, mask, needed_arrays
+from wam_description.wiring import Declaration, Inputs, Outputs, needed_arrays
 from wam_ros.connections import StackNode
 from wam_ros.health import WAITING
 from wam_ros.limits import NODE_LIMITS

@@ -1,6 +1,5 @@
 """A ROS node that no message, request or timer ends: what a callback raises is a fault with the node's name."""
 
-import functools
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -94,7 +93,6 @@ class TolerantNode(LeavingNode):
         Its result is that of `otherwise` then.
         """
 
-        @functools.wraps(callback)  # rclpy looks at its signature
         def bear(*arguments: Any) -> Any:
             if not self._has_ended:
                 try:

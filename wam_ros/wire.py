@@ -20,9 +20,8 @@ from wam_bag.cdr import Pattern, first_stamp
 from wam_bag.value_messages import Encode, joint_states, tables, wrenches
 from wam_description.arm import Arm, Shared
 from wam_description.defects import defect_finder, frames, owners
-from wam_description.signals import NodeStatus, State, Table, Wrench
+from wam_description.signals import NodeStatus, State, Table, Wrench, mask
 from wam_description.topics import JOINT_STATE, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
-from wam_description.wiring import mask
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.markers import contact_markers
 from wam_ros.messages import Refused, message_type, most_rows, read_status, reader

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 from wam_description.defects import Check
 from wam_description.interface import Feed, is_packaged
 from wam_description.message_bus import MessageBus, Publish, Take
+from wam_description.signals import mask
 from wam_description.synchroniser import Inlet, OutOfTime
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
-from wam_description.wiring import Declaration, Outputs, mask
+from wam_description.wiring import Declaration, Outputs
 
 
 class TopicValue(NamedTuple):
