@@ -6,7 +6,7 @@ delay, is in the stamps (`wam_description.synchroniser`), so that the bits are t
 only passes through here; as `Any` it need not become one of C and back in each function.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -42,11 +42,16 @@ class QueuedBus(MessageBus):
     ----------
     later : lets the executor call a function in its turn.
     most : messages in one turn.
+
+    Attributes
+    ----------
+    unserved : subscriptions of the middleware whose nodes get the messages here, by topic.
     """
 
     def __init__(self, later: Callable[[Callable[[], None]], object], most: int) -> None:
         super().__init__()
         self._later, self._most = later, most
+        self.unserved: Counter[str] = Counter()
         self._next: deque[tuple[list[Take], deque[tuple[Any, Any]]]] = deque()  # whose message is next
 
     def publisher(self, topic: str, depth: int = 1) -> Publish:

@@ -163,5 +163,6 @@ class StackNode(TolerantNode):
         """End only when the others have what was published."""
         self.health.report_end()
         self.outlets.wait_for_delivery()
+        self.inlets.close()
         super().destroy_node()
         self._place.close()

@@ -1,5 +1,6 @@
 """What a node takes: subscriptions, each decoded and from one publisher; a message that is refused is reported."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -89,6 +90,7 @@ class Inlets:
         self._node = node
         self.subscriptions: dict[str, Subscription] = {}
         self.claims: dict[str, PublisherClaim] = {}
+        self._unserved = Counter[str]()
         node.create_timer(NODE_LIMITS.claim_period, self._look_at_all)
 
     def feed(
@@ -157,8 +159,15 @@ class Inlets:
         subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
         if is_local:
             node.leave_unserved(subscription)
+            self._unserved[subscription.topic_name] += 1
+            bus.unserved[subscription.topic_name] += 1
         self.subscriptions[topic] = subscription
         return is_local
+
+    def close(self) -> None:
+        """The subscriptions are about to end."""
+        if bus := self._node.outlets.bus:
+            bus.unserved -= self._unserved
 
     def _look(self, topic: str) -> Event | None:
         rivals = self.claims[topic].rivals()

@@ -33,7 +33,7 @@ class Outlets:
     Attributes
     ----------
     bus : that carries messages within the process; None where there is none.
-    published : messages so far, by topic.
+    published : messages so far that were written for other processes, by topic: as many as the middleware numbers.
     full : full name of each topic.
     """
 
@@ -45,7 +45,10 @@ class Outlets:
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
         }
         self._encoders = {row.name: encoder(row, node.shared) for row in rows}
-        self._write = {row.name: self._publishers[row.name].handle.publish_raw for row in rows}
+        handles = {row.name: self._publishers[row.name].handle for row in rows}
+        self._write = {name: handle.publish_raw for name, handle in handles.items()}
+        # a latched message waits for those that come later
+        self._listeners = {row.name: handles[row.name].get_subscription_count for row in rows if not row.latched}
         self.published = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
         bus, most = self.bus, waiting(node.shared.timing)
@@ -53,9 +56,11 @@ class Outlets:
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
-        data = self._encoders[topic](stamp, value)
-        self.published[topic] += 1
-        self._write[topic](data)  # of rclpy, without asking which type each message has
+        data, listeners = self._encoders[topic](stamp, value), self._listeners.get(topic)
+        # as rclcpp does: the middleware gets what somebody takes from it
+        if listeners is None or listeners() > (self.bus.unserved[self.full[topic]] if self.bus else 0):
+            self.published[topic] += 1
+            self._write[topic](data)  # of rclpy, without asking which type each message has
         if here := self._here.get(topic):
             here(stamp, Sent(value, data))
 

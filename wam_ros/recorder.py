@@ -179,6 +179,7 @@ class Recorder:
         all, and no latched message, which may be older, has an earlier one.
     writers : finds the present publishers of a topic: the node of each, by its identity.
     namespace : of the arm, by which its nodes are named in /diagnostics.
+    is_late : whether the recording begins in the middle of the run, whatever the numbers of the messages are.
     """
 
     def __init__(
@@ -188,8 +189,9 @@ class Recorder:
         mode: str,
         writers: Callable[[str], Mapping[str, str]],
         namespace: str,
+        is_late: bool = False,
     ) -> None:
-        self.failure = ""
+        self.failure, self._is_late = "", is_late
         self._received = 0
         self._bag = bag
         self._lockstep = mode == "lockstep"
@@ -231,7 +233,9 @@ class Recorder:
             if not stamp and len(self._held) < RECORDER_LIMITS.held:
                 self._held.append(one)
                 return
-            self._begin_at(stamp if stamp and number > 1 else 0)  # before the first one of a publisher nothing was
+            self._begin_at(
+                stamp if stamp and (number > 1 or self._is_late) else 0
+            )  # before the first one of a publisher nothing was
         self._write(*one)
 
     def _begin_at(self, begin: int) -> None:

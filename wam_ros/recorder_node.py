@@ -46,12 +46,13 @@ class RecorderNode(StackNode):
             raise ParameterError(f"node '{RECORDER}': {error} (parameters 'directory' and 'name')") from None
         topics = {self.resolve_topic_name(topic_name(self, topic)): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
-        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, self._writers, self.get_namespace())
+        self._ends_last = RECORDER in interface.names  # one that was started by hand may end before the others
+        mode, namespace = shared.timing.mode, self.get_namespace()
+        self.recorder = Recorder(self.bag, chosen, mode, self._writers, namespace, not self._ends_last)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
         stampless_first = sorted(topics.items(), key=lambda item: not item[1].latched)
         self._drained = {name: self._listen(name, topic) for name, topic in stampless_first}
-        self._ends_last = RECORDER in interface.names  # one that was started by hand may end before the others
         self._unfinished = set(self.peers.names) if self._ends_last else set()  # nodes without a final count
         self.stack = RecordedStack(self)
         self._attached = ""

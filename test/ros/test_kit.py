@@ -159,10 +159,19 @@ def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
     from rclpy.node import Node
 
     node, heard = Node("mine", namespace="wam", context=arm.start(nodes=INNER).context), []
-    node.create_subscription(JointState, "joint_states", heard.append, 10)
+    written = arm.nodes["transform"].outlets.published
+    arm.run(0.1)
+    assert written["joint_states"] == 0  # the nodes of the process hand it to each other
+    listener = node.create_subscription(JointState, "joint_states", heard.append, 10)
     arm.add(node)
     arm.run_until(lambda: len(heard) > 20)
     assert list(heard[0].name) == list(arm.configuration.shared.arm.joints.names)
+    node.destroy_subscription(listener)
+    before = written["joint_states"]
+    arm.nodes["gravity"].inlets.close()  # it takes joint_states, too, and ends
+    node.create_subscription(JointState, "joint_states", heard.append, 10)
+    arm.nodes["transform"].outlets.publish("joint_states", 1, State([0.0] * 4, [0.0] * 4, []))
+    assert written["joint_states"] == before + 1
 
 
 def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:

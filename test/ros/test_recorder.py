@@ -88,10 +88,10 @@ def sending(ros: Any, count: int, node: RecorderNode | None = None, step: int = 
     return sender
 
 
-def machine(folder: Path, *topics: str, mode: str = "lockstep", arm: str = "/wam") -> Recorder:
+def machine(folder: Path, *topics: str, mode: str = "lockstep", arm: str = "/wam", is_late: bool = False) -> Recorder:
     """A recorder of topics, by their full names, without ROS."""
     rows = {name: BY_NAME[name if name in BY_NAME else name.removeprefix("/wam/")] for name in topics}
-    return Recorder(BagWriter(folder / "bag"), rows, mode, lambda name: {"1": "driver"}, arm)
+    return Recorder(BagWriter(folder / "bag"), rows, mode, lambda name: {"1": "driver"}, arm, is_late)
 
 
 def listening(ros: Any) -> list[Any]:
@@ -686,12 +686,14 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, m
     assert {name: published[name] for name in recorded} == recorded
 
 
-@pytest.mark.parametrize(("number", "begin"), [(1, 0), (6001, 6_000_000_000)])
+@pytest.mark.parametrize(
+    ("number", "late", "begin"), [(1, False, 0), (1, True, 6_000_000_000), (6001, False, 6_000_000_000)]
+)
 def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
-    number: int, begin: int, tmp_path: Path
+    number: int, late: bool, begin: int, tmp_path: Path
 ) -> None:
     """Its duration, and with that its rates, would count from the start of the run."""
-    found = machine(tmp_path, "/wam/robot_description", "/wam/status", "/wam/motor_states")
+    found = machine(tmp_path, "/wam/robot_description", "/wam/status", "/wam/motor_states", is_late=late)
     found.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
     found.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)
     for k in range(3):
