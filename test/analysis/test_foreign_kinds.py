@@ -267,6 +267,9 @@ def few_cycles() -> list[Case]:
         Case("beside a fast one", sqlite, without(fast, lambda _: True, "velocity", "effort"),
              {"a: frequency": 11.0, "a: cycle, peak to peak": 0.002}),
         Case("in a part", sqlite, part, {"a from 15.0 s: frequency": 11.0, "a from 15.0 s: end": 30.0}),
+        Case("in each half", by_rosbags, without(one("/js", 100.0, 0.3, 0.5, lambda q: np.interp(
+            np.arange(3000) * 9 // 10 / 0.9, np.arange(3000), q)), lambda _: True, "velocity", "effort"), {}, "",
+            NOTHING, ("a repeats at 0.3 Hz, 0.996 rad peak to peak. /js: 3000 messages",)),
         Case("with some lost", ros1, lost, {"a, 11 Hz: amplitude": 0.001}, "messages missing"),
         *(Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
                ("No vibration was found above", f"recording: {seconds:g} s"))

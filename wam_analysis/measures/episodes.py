@@ -24,7 +24,8 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
 
     Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
     window or beyond it, and is evaluated between these ends.  A motion that decays or grows between them is none.
-    There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow motion.
+    There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow motion: one
+    that ends within a period is part of its shape.
 
     Parameters
     ----------
@@ -55,12 +56,9 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             period = _refined(time[inner], flat[inner], cycle.period)
             both = (_cycle(time[inner], signal[inner], least, period) for signal in (value, flat))
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
-            is_transient = (
-                _changes(time[inner], flat[inner], period)
-                if better is None
-                else any(one.goes_on(first, last, better) for one in transients)
-            )
-            if is_transient:
+            is_shape = CYCLE.slowest_cycles * (last - first) < np.max(longest[first:last] % n)  # of a slower one
+            goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
+            if is_shape or goes_on or (better is None and _changes(time[inner], flat[inner], period)):
                 transients.append(_Transient(first, last, period, _width(time, period)))
                 lag = 0.0  # its last part is no limit cycle
             else:
