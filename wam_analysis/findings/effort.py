@@ -26,11 +26,12 @@ def effort_section(recording: AnalysedRecording) -> Section:
     sentences, findings, brief, alone = [], [], [], []
     doubts, wrong = list[str](), list[str]()
     moving = [one for one in states if one.is_joint and not rests(one)]
-    powered = {one.name for one in moving if np.any(one.values.get("effort", 0.0))}
+    driven = {one.name for one in moving if np.any(one.values.get("effort", 0.0))}
     for one in moving:
-        unlike = contradiction(one) or _limited(one)
-        wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
-        found, lag = (Friction(), 0.0) if unlike else friction(one)
+        if unlike := contradiction(one) or _limited(one):
+            wrong.append(f"{one.label}: {unlike}, so friction and inertia are not computed.")
+            continue
+        found, lag = friction(one)
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s").partition("/")[0]
         every = (
             ("dry friction", effort, found.dynamic),
@@ -38,8 +39,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            has_any = np.any(one.values.get("effort", one.name not in powered))
-            if powered and has_any and not unlike and one.values.keys() != {"effort"}:
+            if driven and np.any(one.values.get("effort", one.name not in driven)) and one.values.keys() != {"effort"}:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue

@@ -183,7 +183,7 @@ def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
         if parts := {*getattr(value, "_fields", getattr(value, "__dict__", ()))}:
             value = [value.x, value.y, value.z] if parts == {*"xyz"} else ""  # not a quaternion
         try:
-            found.append(np.atleast_1d(np.asarray(value, np.float64)).ravel())
+            found.append(np.asarray(value, np.float64).ravel())
         except (TypeError, ValueError):
             raise ValueError(f"{topic}: the field '{path}' has no numbers") from None
     return found

@@ -336,24 +336,23 @@ def _treated(one: Source) -> Source:
         elif (number := int(np.sum(np.isfinite(value)))) < len(value):
             treated.append(Treated(Treatment.SPARSE, quantity, number, len(value)))
     if "position" in values and one.units["position"] == "rad":
-        known = np.isfinite(values["position"])
-        unwrapped, wraps, turn = _unwrapped(one.time[known], values["position"][known], one.is_command)
+        position = values["position"].copy()
+        known = np.isfinite(position)
+        position[known], wraps, turn = _unwrapped(one.time[known], position[known], one.is_command)
         if wraps:
-            values["position"] = values["position"].copy()
-            values["position"][known] = unwrapped
+            values["position"] = position
             treated.append(Treated(Treatment.WRAPPED, "position", wraps, size=turn))
     for quantity, value in values.items():
         if not one.is_command and len(rows := _spikes(value)):
-            values[quantity] = value.copy()
-            values[quantity][rows] = 0.5 * (value[rows - 1] + value[rows + 1])
-            size = np.max(np.abs(value - values[quantity])[rows])
+            mean, values[quantity] = 0.5 * (value[rows - 1] + value[rows + 1]), value.copy()
+            values[quantity][rows] = mean
+            size = np.max(np.abs(value[rows] - mean))
             treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
     if "position" in values and not one.is_command:
         shown = one._replace(values=values).only("position", "velocity")
         jumps = _jumps(shown)
         if len(sizes := jumps[jumps != 0.0]):
-            whole = np.cumsum(jumps)[row_at(shown.time, one.time)]
-            values["position"] = values["position"] - whole
+            values["position"] = values["position"] - np.cumsum(jumps)[row_at(shown.time, one.time)]
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
     factor, unfit = velocity_fit(one._replace(values=values))
     if unfit and not one.is_command:
