@@ -89,8 +89,7 @@ def test_a_number_that_cannot_be_changed_is_named(
 
 
 @pytest.mark.parametrize(
-    "words",
-    ["demo --scenario", "demo --task", "demo --name", "up --scenario", "sweep t.csv --vary seed=1 --scenario"],
+    "words", ["demo --scenario", "demo --task", "demo --name", "up --scenario", "sweep t.csv --vary seed=1 --scenario"]
 )
 def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     words: str, capsys: pytest.CaptureFixture[str]

@@ -79,8 +79,7 @@ def test_the_axes_of_a_cover_point_where_the_page_states(cover: str, name: str, 
 
 
 @pytest.mark.parametrize(
-    ("namespace", "prefix", "topics"),
-    [("wam", "", "/"), ("left", "left/", "/"), ("left", "", "/left/")],
+    ("namespace", "prefix", "topics"), [("wam", "", "/"), ("left", "left/", "/"), ("left", "", "/left/")]
 )
 def test_a_running_stack_has_its_frames_on_tf(domain_id: int, namespace: str, prefix: str, topics: str) -> None:
     messages = pytest.importorskip("tf2_msgs.msg", reason="needs tf2_msgs, of a ROS installation; not in the wheels")

@@ -369,10 +369,7 @@ def noisy(**sensors: tuple[float, ...]) -> DriverParameters:
 
 
 NOISY = noisy(
-    encoder_resolution=(1e-3,) * 4,
-    encoder_noise=(1e-3,) * 4,
-    joint_encoder_noise=(1e-3,) * 4,
-    strain_noise=(0.1,) * 4,
+    encoder_resolution=(1e-3,) * 4, encoder_noise=(1e-3,) * 4, joint_encoder_noise=(1e-3,) * 4, strain_noise=(0.1,) * 4
 )
 
 

@@ -304,8 +304,7 @@ def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
 
 
 @pytest.mark.parametrize(
-    ("option", "words"),
-    [("trajectory_action", ["--trajectories"]), ("tf", ["--tf", "--frame-prefix", "left/"])],
+    ("option", "words"), [("trajectory_action", ["--trajectories"]), ("tf", ["--tf", "--frame-prefix", "left/"])]
 )
 def test_launch_serves_next_to_the_stack_what_has_its_type(option, words, launch_file, monkeypatch):
     _, start = launch_file

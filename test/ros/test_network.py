@@ -284,10 +284,7 @@ rclpy.shutdown()
 
 
 def test_a_link_that_is_cut_brakes_by_name_and_the_operator_alone_ends_the_fault(
-    programs: Callable[..., subprocess.Popen[str]],
-    domain_id: int,
-    hosts: tuple[tuple[str, ...], ...],
-    tmp_path: Path,
+    programs: Callable[..., subprocess.Popen[str]], domain_id: int, hosts: tuple[tuple[str, ...], ...], tmp_path: Path
 ) -> None:
     here, elsewhere = hosts
     file = tmp_path / "realtime.yaml"

@@ -433,9 +433,7 @@ def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("steps", [0, 50, 300])
-def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(
-    steps: int,
-) -> None:
+def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(steps: int) -> None:
     """The nodes that wait for it refuse what the others send, and the driver brakes, as over topics."""
     wam = Configuration.load(packaged("wam"))
     silent = silent_after(declared("gravity").node, steps)

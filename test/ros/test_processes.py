@@ -138,13 +138,7 @@ def enable(ros: Any, stack: Stack) -> None:
     ros.wait(lambda: "enabled" in seen, what=f"the status 'enabled'; {stack.said()}")
 
 
-@pytest.mark.parametrize(
-    ("number", "options"),
-    [
-        (signal.SIGINT, ()),
-        (signal.SIGTERM, ("--processes", GROUPED)),
-    ],
-)
+@pytest.mark.parametrize(("number", "options"), [(signal.SIGINT, ()), (signal.SIGTERM, ("--processes", GROUPED))])
 def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     number: signal.Signals, options: tuple[str, ...], started: Any, tmp_path: Path, ros: Any
 ) -> None:
@@ -393,8 +387,7 @@ def test_a_reader_who_has_had_enough_is_no_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ros_arguments", "text"),
-    [(["-p", "x"], "-p x"), (["-p"], "trailing -p flag"), (["--nonsense"], "--nonsense")],
+    ("ros_arguments", "text"), [(["-p", "x"], "-p x"), (["-p"], "trailing -p flag"), (["--nonsense"], "--nonsense")]
 )
 def test_wrong_ros_arguments_end_a_program_with_one_line(
     ros_arguments: list[str], text: str, domain_id: int, monkeypatch: pytest.MonkeyPatch

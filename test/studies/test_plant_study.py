@@ -4,12 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from wam_studies.plant.effects import (
-    actuator_cycle_with_backlash,
-    errors,
-    table,
-    torque_loop_response,
-)
+from wam_studies.plant.effects import actuator_cycle_with_backlash, errors, table, torque_loop_response
 from wam_studies.plant.ideal_testbed import IMMOVABLE, STEP, ideal_testbed, released_plant
 
 # relative to theory
