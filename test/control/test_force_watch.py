@@ -182,14 +182,17 @@ def swing(size: float, period: float = 0.2) -> Callable[[float], float]:
     return lambda time: FORCE + size * math.sin(2.0 * math.pi * time / period)
 
 
-def test_an_oscillation_is_reported_with_its_size_and_ends_and_the_arm_is_slowed_down_before() -> None:
+@pytest.mark.parametrize("dithered", [False, True])
+def test_an_oscillation_is_reported_with_its_size_and_ends_and_the_arm_is_slowed_down_before(dithered: bool) -> None:
     pressed = Pressed()
+    pressed.watch = ForceWatch(dithered)
     pressed.go(0.5)
     found = pressed.go(SETTLING, swing(0.4))
     (event,) = [event for event in found[-1] if event.code is Code.OSCILLATING]
     assert not event.holds
     assert event.values["swing"] == pytest.approx(0.8, rel=0.02)
     assert event.values["period"] == pytest.approx(0.2, rel=0.02)
+    assert ("timing.dither_cycle" in sentence(event)) == dithered
     assert pressed.watch.oscillation.share == 0.25
     assert pressed.last(2.0 * SETTLING + 0.1) == []
 

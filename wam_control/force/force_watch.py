@@ -92,13 +92,17 @@ class TouchWatch:
 class Oscillation:
     """Slows the arm along a force that oscillates, and reports the oscillation if that does not help.
 
+    Parameters
+    ----------
+    is_dithered : whether the motors have a dither, which shakes the force.
+
     Attributes
     ----------
     share : of the speed along the force.
     """
 
-    def __init__(self) -> None:
-        self.share = 1.0
+    def __init__(self, is_dithered: bool) -> None:
+        self.share, self._is_dithered = 1.0, is_dithered
         self._turns, self._faint, self._lasting = Turns(), Turns(), Lasting()
 
     def rest(self) -> None:
@@ -129,7 +133,8 @@ class Oscillation:
                 period=period,
                 desired=desired,
                 allowed=own.limits.cycle_force,
-                source=_source(own),
+                source=_source(own, self._is_dithered),
+                dither=float(self._is_dithered),
             )
         if faint > FORCE.turns // 2 and self.share > FORCE.least_share:
             self.share *= FORCE.slowed
@@ -170,7 +175,7 @@ class ForceWatch:
 
     def __init__(self, is_dithered: bool) -> None:
         self._is_dithered = is_dithered
-        self.touch, self.oscillation = TouchWatch(), Oscillation()
+        self.touch, self.oscillation = TouchWatch(), Oscillation(is_dithered)
         self.ended: Event | None = None
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
         # of the largest doubt: 1 while it is refused, then somewhat more, and any once it is decided
@@ -354,7 +359,7 @@ class MotionWatch:
         )
 
 
-def _source(own: ForceLoopParameters, is_dithered: bool = False) -> str:
+def _source(own: ForceLoopParameters, is_dithered: bool) -> str:
     """What measures the force."""
     return ("dithered motors" if is_dithered else "motors") if own.is_estimated else "sensors"
 

@@ -29,7 +29,7 @@ class ServoGuardParameters:
     """Assumptions about the velocity loop, and the reaction to unstable gains."""
 
     mode: str = parameter(
-        "off: accept any gains; refuse: refuse gains that are not stable or do not hold the arm",
+        "off: accept any gains; refuse: refuse gains that are not stable or cannot slow a motor down",
         choices=("off", "refuse"),
     )
     stability_fraction: float = parameter(
@@ -68,7 +68,7 @@ class ServoGuard:
         self._arm, self._timing, self._parameters = arm, timing, parameters
 
     def require_stable(self, servo: Servo) -> None:
-        """Refuse gains that are not stable, or that do not hold the arm.
+        """Refuse gains that are not stable, or cannot slow a motor down.
 
         Raises
         ------
