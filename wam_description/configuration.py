@@ -230,7 +230,10 @@ def differences(path: Path, loaded: Configuration) -> list[str]:
     more = [f"  and {len(rows) - FILES.differences} more"] if len(rows) > FILES.differences else []
     lengths = [name for name in LENGTHS if name in changed]
     is_open = lengths and not any(name in changed for name in MASSES)
-    question = f"{', '.join(lengths)} changed: is the link as heavy as before? If not, change {', '.join(MASSES)}"
+    question = (
+        f"{', '.join(lengths)} changed: does arm.covers.end still fit, and is the link as heavy as before? "
+        f"If not, change {', '.join(MASSES)}"
+    )
     return [
         f"{path} differs from {base_file.stem}:",
         *rows[: FILES.differences],

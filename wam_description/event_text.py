@@ -23,7 +23,7 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "no single contact explains the torques",
-    Reason.ALONG: "a force along this link, or along the link before it, explains the torques as well",
+    Reason.ALONG: "a force along this link, or along the link before it, explains the torques equally well",
     Reason.PAYLOAD: "a payload that was picked up may also explain the torques; the probabilities of the links and of "
     "the payload add up to 1",
     Reason.TOO_EARLY: "too few samples so far",
@@ -160,7 +160,7 @@ SENTENCES: Final = {  # by cause
 }
 LESS: Final = "command less; if little is commanded, a controller has a wrong sign or too large a gain"
 LOADED: Final = "declare the load (arm.payload); if the tool carries none, "  # else the model is wrong
-TURNED: Final = "a force in the frame of a link turns with it"
+TURNED: Final = "in the frame of a link the force turns with it"
 SINCE: Final = ("without reaching it", "since the force was last within its tolerance")
 REACH: Final = (
     "nothing is touched; bring the arm to the surface first, or command more force",
@@ -249,7 +249,8 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
     """What to do in place of a refused force: what was found, and what helps against its largest part."""
     found = []
     if "turn" in values:
-        found.append(f"turn {values['turn']} from {values['turn_from']:.2f} to {values['turn_to']:.1f} rad ({TURNED})")
+        angles = f"from {values['turn_from']:.2f} to {values['turn_to']:.1f} rad"
+        found.append(f"lift off, turn {values['turn']} {angles}, and repeat the command ({TURNED})")
     if "more_force" in values:
         found.append(f"command {values['more_force']:g} N")
     if "pin" in values and helps is not PINNED:

@@ -147,7 +147,7 @@ class CoverLoads:
             if abs(normal @ axis) > PLANT.least_normal and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half:
                 return (
                     f"{found} an edge, where the direction of the contact force is unknown; allowed: "
-                    f"{radius * 1e3:.3g} mm, the radius of the tube; press less, or on a stiffer surface"
+                    f"{radius * 1e3:.3g} mm, the radius of the tube; keep off it, press less, or use a stiffer surface"
                 )
         return ""
 

@@ -186,5 +186,5 @@ class Lockstep:
         """How fast time has passed, for people."""
         simulated, elapsed = self.pacer.passed
         if not elapsed:
-            return "no period was run"
+            return "no period followed another at once, so the pace is not known"
         return f"{simulated:.1f} s of the arm in {elapsed:.1f} s: real-time factor {simulated / elapsed:.2f}"
