@@ -269,9 +269,8 @@ class Synchroniser:
         age = self._last - stamp
         if not self._last or -spec.limit_ns <= age <= spec.limit_ns:
             return
-        far = "older than" if age > 0 else "ahead of"
-        late = f"this node, or its {self._trigger}, is late; end other programs if the computer is busy"
-        cure = late if spec.streamed else CURE
+        far, who = ("older than", "its sender") if age > 0 else ("ahead of", f"this node, or its {self._trigger},")
+        cure = f"{who} is late; end other programs if the computer is busy" if spec.streamed else CURE
         raise OutOfTime(
             f"stamp {stamp} ns is {seconds(abs(age)):.3g} s {far} the newest state that this node has, {self._last} "
             f"ns, allowed: {seconds(spec.limit_ns):.3g} s; {cure}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+from wam_description.arm import seconds
 from wam_description.event import Event, fault
 from wam_description.interface import Interface
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
@@ -186,5 +187,5 @@ class Lockstep:
         """How fast time has passed, for people."""
         simulated, elapsed = self.pacer.passed
         if not elapsed:
-            return "no period followed another at once, so the pace is not known"
+            return f"it ended at {seconds(self._driver.stamp):.3g} s of the arm's time"
         return f"{simulated:.1f} s of the arm in {elapsed:.1f} s: real-time factor {simulated / elapsed:.2f}"

@@ -24,7 +24,7 @@ from wam_description.message_bus import QueuedBus
 from wam_description.parameters import ParameterError
 from wam_ros.limits import NODE_LIMITS, PROCESS_LIMITS
 from wam_ros.network import limit_to_this_machine
-from wam_ros.process_signals import LISTENER_GONE, Stop
+from wam_ros.process_signals import LISTENER_GONE, Stop, leaving
 from wam_ros.processors import keep_to_processors
 from wam_ros.ros_topics import NAMESPACE
 
@@ -190,7 +190,8 @@ class Connection(Closing):
         self.context.end = time.monotonic() + (limits.short_delivery if self.listener_gone else limits.delivery)
         for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
             self.remove(node)
-        self.executor.shutdown()
+        with leaving(self.context):  # an events executor has kept the nodes, and with them the participant
+            self.executor.shutdown()
         rclpy.try_shutdown(context=self.context)
 
 

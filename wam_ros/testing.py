@@ -195,7 +195,7 @@ class RunningArm:
         return self._recorded
 
     def newest(self, topic: str) -> Any:
-        """The newest value of a topic, or message of one that no step takes; None before the first.
+        """The newest value of a topic, message of a type that no step can take, or None before the first.
 
         In a condition it is cheaper than `recorded`.
         """

@@ -354,6 +354,7 @@ def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> Non
             sense(estimator, arm, ZERO)
         found[name] = (estimator.estimate(), estimator.zero(), estimator.estimate())
     assert found["none"][0].in_contact
+    assert not found["none"][2].in_contact, "a person says that nothing is touched"
     before, reason, after = found["declared"]
     assert (before.in_contact, reason) == (False, "")
     assert before.torque_sd[3] > 3.0 * after.torque_sd[3]

@@ -227,20 +227,21 @@ def test_a_recorder_that_does_not_end_is_killed_and_named(
 
 
 HELD_UP = """
-import rclpy.node
-
-def destroy_node(self):
+def held_up(self, *given):
     while True:
         pass
 
-rclpy.node.Node.destroy_node = destroy_node
+Held.destroy_node = Held.shutdown = held_up
 """
 
 
+@pytest.mark.parametrize(
+    "held", ["from rclpy.node import Node as Held", "from rclpy._rclpy_pybind11 import EventsExecutor as Held"]
+)
 def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_its_work(
-    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
+    held: str, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
-    (tmp_path / "sitecustomize.py").write_text(HELD_UP)
+    (tmp_path / "sitecustomize.py").write_text(f"{held}\n{HELD_UP}")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
     monkeypatch.chdir(tmp_path)
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))

@@ -124,7 +124,7 @@ class ContactEstimator:
 
         The earlier torques of a contact are forgotten: they were measured with another zero.
         """
-        reason = self._observer.zero()
+        reason = self._observer.zero(self._parameters.detect)
         if not reason:
             self._inference.fusion.reset()
         return reason

@@ -120,8 +120,10 @@ class ModelErrors:
         torques, covariance = self.corrected(seen)
         return torques, self.size * covariance
 
-    def zero(self, seen: Observation) -> None:
+    def zero(self, seen: Observation, detect: float) -> None:
         """Take a moment at rest as one of an arm that nothing touches.
+
+        What would count as a contact shows that the errors of the model are larger than was thought.
 
         Another one in the same pose has the same errors of the gauges: it takes the place of the one before.
         """
@@ -131,7 +133,9 @@ class ModelErrors:
         self.errors, self.covariance = elsewhere
         self._pose = _Pose(seen.pose, elsewhere=elsewhere)
         innovation, covariance = self.corrected(seen)
-        self._take(innovation, covariance, seen)
+        statistic = float(innovation.dot(np.linalg.solve(covariance, innovation)))
+        self.covariance = self.covariance * max(1.0, statistic / detect)
+        self._take(*self.corrected(seen), seen)
 
     def _take(self, innovation: Array, covariance: Array, seen: Observation) -> None:
         """Learn from an innovation, (n,), N m, by its covariance, (n, n)."""

@@ -237,10 +237,11 @@ class MomentumObserver:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
         return self._effects.observation(self._filters.motion(which), self._last.inertia, which)
 
-    def zero(self) -> str:
+    def zero(self, detect: float) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
 
-        Masses, centres of mass and payload are known better then, in other poses, too.
+        Masses, centres of mass and payload are known better then, in other poses, too; worse where the torques had a
+        statistic above `detect`.
         """
         if not self._is_link_side:
             error = self._errors.by_name["payload"]
@@ -253,7 +254,7 @@ class MomentumObserver:
         if max(map(abs, self._last.qd)) > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
-        self._errors.zero(self.seen)
+        self._errors.zero(self.seen, detect)
         return ""
 
 
