@@ -274,7 +274,7 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     own = replace(OWN, force_gain=(0.09,))
     loop, here = Loop(own), list(own.guard.posture)
     seen = loop.supervision
-    assert seen.report.facts["pose of margin here"].startswith("at `worst case`, until")
+    assert seen.report.facts["pose of margin here"].startswith("that of `margin`, until")
     assert follow(loop, here) == 1.0
     assert seen.watch is not None
     assert seen.report.facts["margin here"].startswith(f"{seen.watch.scale:.4g}"), "also where the factor stays"

@@ -34,7 +34,7 @@ from wam_description.parameters import require
 from wam_description.signals import Contact
 from wam_description.transmission_map import TransmissionMap
 
-UNKNOWN: Final = "at `worst case`, until a force is commanded"
+UNKNOWN: Final = "that of `margin`, until a force is commanded"
 
 
 class Report(NamedTuple):
