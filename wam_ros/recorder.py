@@ -233,9 +233,8 @@ class Recorder:
             if not stamp and len(self._held) < RECORDER_LIMITS.held:
                 self._held.append(one)
                 return
-            self._begin_at(
-                stamp if stamp and (number > 1 or self._is_late) else 0
-            )  # before the first one of a publisher nothing was
+            is_start = number <= 1 and not self._is_late  # before the first one of a publisher nothing was
+            self._begin_at(0 if is_start else stamp or 0)
         self._write(*one)
 
     def _begin_at(self, begin: int) -> None:

@@ -177,9 +177,13 @@ def _frames(columns: Messages) -> Texts:
 
 def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
     """The numbers at a path in each message, none where it has no such field; those of a vector are x, y, z."""
+    if not path:
+        return [np.zeros(0)] * len(columns.messages)
     found = []
     for message in columns.messages:
-        value: Any = _at(topic, message, path) if _has([message], path) else ()
+        value: Any = ()
+        with suppress(ValueError):
+            value = _at(topic, message, path)
         if parts := {*getattr(value, "_fields", getattr(value, "__dict__", ()))}:
             value = [value.x, value.y, value.z] if parts == {*"xyz"} else ""  # not a quaternion
         try:
