@@ -14,6 +14,7 @@ from wam_bag.cdr import CDR, MessageType
 from wam_bag.definitions import schema
 from wam_bag.message_text import definitions
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
+from wam_ros.health import WRITTEN
 
 
 def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tuple[str, ...] = ()) -> list[str]:
@@ -21,7 +22,7 @@ def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tupl
 
     Messages of a topic are compared in the order in which each publisher sent them; padding bytes
     do not count.  Topics of several publishers (status, diagnostics) are compared per node, without the facts
-    that tell how fast time passed on the wall clock.
+    that tell how fast time passed on the wall clock, or how many messages other processes took.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def _fields(a: Any, b: Any, name: str) -> Iterator[str]:
     if isinstance(a, float) and isinstance(b, float):
         if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
             yield f"{name} {a!r} and {b!r}"
-    elif getattr(a, "key", None) in (BEHIND, REAL_TIME_FACTOR, SLIPS) and a.key == getattr(b, "key", None):
+    elif getattr(a, "key", "").startswith((BEHIND, REAL_TIME_FACTOR, SLIPS, WRITTEN)) and a.key == getattr(b, "key", 0):
         return
     elif hasattr(a, "_fields"):
         for field in a._fields:

@@ -46,12 +46,14 @@ class QueuedBus(MessageBus):
     Attributes
     ----------
     unserved : subscriptions of the middleware whose nodes get the messages here, by topic.
+    tapes : of the recorders of this process: called with the full name and the bytes of what only this process takes.
     """
 
     def __init__(self, later: Callable[[Callable[[], None]], object], most: int) -> None:
         super().__init__()
         self._later, self._most = later, most
         self.unserved: Counter[str] = Counter()
+        self.tapes: list[Callable[[str, bytes], object]] = []
         self._next: deque[tuple[list[Take], deque[tuple[Any, Any]]]] = deque()  # whose message is next
 
     def publisher(self, topic: str, depth: int = 1) -> Publish:

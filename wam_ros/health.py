@@ -23,7 +23,7 @@ from wam_ros.ros_topics import DIAGNOSTICS, SECOND, header
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
-PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
+WRITTEN, NODE, ENDED = "written ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
 def problem_of(cause: str, reason: str) -> Event | None:
@@ -238,14 +238,14 @@ class Health:
             self.publish_again()
 
     def report_end(self) -> None:
-        """Report how much was published in all."""
+        """Report how much was written in all."""
         self.facts[ENDED] = "yes"
         self._report()
 
     def _report(self) -> None:
-        """Publish the diagnostics, with how many messages were published on each topic, this one included."""
+        """Publish the diagnostics, with how many messages were written for others on each topic, this one included."""
         node, outlets = self._node, self._node.outlets
-        totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
+        totals = {**outlets.written, DIAGNOSTICS: outlets.written[DIAGNOSTICS] + 1}
         refused = {
             f"{code.words} on {topic}": one.count
             for code, refusals in self._defects.items()
@@ -253,7 +253,7 @@ class Health:
         }
         facts = {key: str(count) for key, count in sorted({**self.counts, **refused}.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
-        facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
+        facts |= {f"{WRITTEN}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
         facts |= self.facts
         name, present = diagnosed_name(node.get_namespace(), node.get_name()), self.status
         status = NodeStatus(present.level, present.message, name, self.is_ready, fault=present.fault, facts=facts)

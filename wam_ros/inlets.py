@@ -134,8 +134,7 @@ class Inlets:
         """Subscribe to the bytes of messages, or to the values that only nodes of this process publish.
 
         To fetch bytes from the middleware, once for each listener, took most of the time of several nodes in one
-        process.  The bytes are sent all the same, for the recorder and everybody else.  The subscription stays,
-        unserved: the graph shows it, and it reveals a second publisher.
+        process.  The subscription stays, unserved: the graph shows it, and it reveals a second publisher.
 
         Parameters
         ----------
@@ -158,11 +157,16 @@ class Inlets:
             profile.depth = 1
         subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
         if is_local:
-            node.leave_unserved(subscription)
-            self._unserved[subscription.topic_name] += 1
-            bus.unserved[subscription.topic_name] += 1
+            self.leave_unserved(subscription)
         self.subscriptions[topic] = subscription
         return is_local
+
+    def leave_unserved(self, subscription: Subscription) -> None:
+        """Let no executor fetch the messages of a subscription, and what this process publishes not go there alone."""
+        self._node.leave_unserved(subscription)
+        if bus := self._node.outlets.bus:
+            self._unserved[subscription.topic_name] += 1
+            bus.unserved[subscription.topic_name] += 1
 
     def close(self) -> None:
         """The subscriptions are about to end."""

@@ -171,7 +171,7 @@ class AdaptedNode(StackNode):
         for topic, value in outputs.items():
             if topic == STATUS:
                 self._set_status(stamp, value)
-            elif topic not in self.outlets.published:
+            elif topic not in self.outlets.written:
                 self._declaration.require_declared(outputs)
             else:
                 check = self._checks.get(topic)

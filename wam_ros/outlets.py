@@ -33,7 +33,7 @@ class Outlets:
     Attributes
     ----------
     bus : that carries messages within the process; None where there is none.
-    published : messages so far that were written for other processes, by topic: as many as the middleware numbers.
+    written : messages so far for other processes, by topic: as many as the middleware numbers.
     full : full name of each topic.
     """
 
@@ -49,7 +49,7 @@ class Outlets:
         self._write = {name: handle.publish_raw for name, handle in handles.items()}
         # a latched message waits for those that come later
         self._listeners = {row.name: handles[row.name].get_subscription_count for row in rows if not row.latched}
-        self.published = dict.fromkeys(self._publishers, 0)
+        self.written = dict.fromkeys(self._publishers, 0)
         self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
         bus, most = self.bus, waiting(node.shared.timing)
         self._here = {row.name: bus.publisher(self.full[row.name], most) for row in rows} if bus else {}
@@ -59,14 +59,17 @@ class Outlets:
         data, listeners = self._encoders[topic](stamp, value), self._listeners.get(topic)
         # as rclcpp does: the middleware gets what somebody takes from it
         if listeners is None or listeners() > (self.bus.unserved[self.full[topic]] if self.bus else 0):
-            self.published[topic] += 1
+            self.written[topic] += 1
             self._write[topic](data)  # of rclpy, without asking which type each message has
+        elif self.bus:
+            for tape in self.bus.tapes:
+                tape(self.full[topic], data)
         if here := self._here.get(topic):
             here(stamp, Sent(value, data))
 
     def send(self, topic: str, message: Any) -> None:
         """Publish a message on a topic of every node."""
-        self.published[topic] += 1
+        self.written[topic] += 1
         self._publishers[topic].publish(message)
 
     def is_taken(self, topic: str, within: float = 0.0) -> bool:

@@ -18,7 +18,7 @@ from wam_description.signals import NodeStatus
 from wam_description.topics import DEPTH, STATUS, Topic
 from wam_description.yaml_text import parameter_text
 from wam_ros.connections import StackNode
-from wam_ros.health import ENDED, NODE, PUBLISHED, problem_of
+from wam_ros.health import ENDED, NODE, WRITTEN, problem_of
 from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.recorder import Recorder
@@ -53,6 +53,9 @@ class RecorderNode(StackNode):
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
         stampless_first = sorted(topics.items(), key=lambda item: not item[1].latched)
         self._drained = {name: self._listen(name, topic) for name, topic in stampless_first}
+        self._arrived: list[tuple[int, str, bytes, int, int]] = []  # sent, topic, message, received, number
+        self._tapes = self.outlets.bus.tapes if self.outlets.bus else []
+        self._tapes.append(self._keep)
         self._unfinished = set(self.peers.names) if self._ends_last else set()  # nodes without a final count
         self.stack = RecordedStack(self)
         self._attached = ""
@@ -69,6 +72,8 @@ class RecorderNode(StackNode):
         while self.recorder.total("lost_at_end") and time.monotonic() < end:  # it may still be on the way
             time.sleep(0.02)
             self._drain()
+        self._tapes.remove(self._keep)
+        self.inlets.close()
         self._close()
         super(StackNode, self).destroy_node()  # nobody waits for its last report
 
@@ -103,11 +108,16 @@ class RecorderNode(StackNode):
             found[topic.name] = self.create_subscription(
                 message_type(topic), name, lambda data: None, listening(topic), raw=True
             )
-        self.leave_unserved(found[topic.name])
+        self.inlets.leave_unserved(found[topic.name])
         return found[topic.name]
 
+    def _keep(self, name: str, data: bytes) -> None:
+        """Take what a node of this process has published and not written to the middleware."""
+        now = time.time_ns()
+        self._arrived.append((now, name, data, now, 0))
+
     def _take_totals(self, data: bytes) -> None:
-        """Take what the nodes report about the messages that they have published."""
+        """Take what the nodes report about the messages that they have written."""
         try:
             message = deserialized(data, DiagnosticArray, DIAGNOSTICS)
         except Refused:
@@ -117,7 +127,7 @@ class RecorderNode(StackNode):
             if node not in self.peers.names or namespace != self.get_namespace().rstrip("/"):
                 continue  # a node of another arm
             for key, value in facts.items():
-                topic = key.removeprefix(PUBLISHED)
+                topic = key.removeprefix(WRITTEN)
                 if topic != key and value.isdecimal() and len(value) < RECORDER_LIMITS.count_length:
                     self.recorder.announce(node, topic, int(value))
             if ENDED in facts:
@@ -155,7 +165,7 @@ class RecorderNode(StackNode):
 
     def _drain(self) -> None:
         """Record what has arrived, in the order in which it was sent: the time of a message may be that before it."""
-        arrived: list[tuple[int, str, bytes, int, int]] = []
+        arrived, self._arrived = self._arrived, []
         for name, subscription in self._drained.items():
             handle = subscription.handle
             with handle:

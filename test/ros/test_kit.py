@@ -159,7 +159,7 @@ def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
     from rclpy.node import Node
 
     node, heard = Node("mine", namespace="wam", context=arm.start(nodes=INNER).context), []
-    written = arm.nodes["transform"].outlets.published
+    written = arm.nodes["transform"].outlets.written
     arm.run(0.1)
     assert written["joint_states"] == 0  # the nodes of the process hand it to each other
     listener = node.create_subscription(JointState, "joint_states", heard.append, 10)

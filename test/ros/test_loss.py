@@ -231,7 +231,7 @@ def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
     """It reports itself while it computes: from the process of transform to that of the velocity loop."""
     stack = Stack(ros, tmp_path, "realtime")
     slow = make(ros, tmp_path, f"{__name__}:Slow", "/wam", changed([*SIX, f"{__name__}:Slow"], timing__mode="realtime"))
-    published = slow.outlets.published
+    published = slow.outlets.written
     monkeypatch.setattr(Slow, "count", lambda: published["status"])
     peers, reasons = stack.nodes["velocity_loop"].peers, set[str]()
     hear = peers.hear

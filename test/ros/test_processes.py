@@ -542,7 +542,7 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
     monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=0.2))
     configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
     with Composition(configured, domain_id=domain_id) as composition:
-        published = composition.nodes["driver"].outlets.published
+        published = composition.nodes["driver"].outlets.written
 
         def spin_until(is_enough: Callable[[], bool], seconds: float) -> None:
             end = time.monotonic() + seconds

@@ -23,7 +23,6 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
@@ -40,6 +39,7 @@ from wam_description.parameters import ParameterError, dotted
 from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.messages import diagnostic_status, message_type, read_status
+from wam_ros.outlets import Outlets
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
 from wam_ros.ros_topics import header, qos
@@ -510,7 +510,7 @@ def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> No
 
 def report(node: str, ended: bool, arm: str = "wam", **published: int) -> DiagnosticArray:
     """What a node says about how much it has published."""
-    facts = {"node": f"/{arm}/{node}", **{f"published /wam/{topic}": str(count) for topic, count in published.items()}}
+    facts = {"node": f"/{arm}/{node}", **{f"written /wam/{topic}": str(count) for topic, count in published.items()}}
     status = NodeStatus(Level.OK, "ready", node, facts=facts | ({"ended": "yes"} if ended else {}))
     return DiagnosticArray(status=[diagnostic_status(status, "wam")])
 
@@ -670,20 +670,29 @@ def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: P
     assert bag.metadata["recording"]["/wam/motor_states driver received"] == "300"
 
 
-def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_message_is_in_the_bag_while_others_come_and_go(arm: RunningArm, monkeypatch: pytest.MonkeyPatch) -> None:
     published: Counter[str] = Counter()
-    for form in ("publish", "publish_raw"):
-        publish = getattr(_rclpy.Publisher, form)
+    others, heard, written = [], [], {}
+    for form in ("publish", "send"):
+        publish = getattr(Outlets, form)
 
-        def counting(handle: Any, message: Any, publish: Any = publish) -> None:
-            published[handle.get_topic_name()] += 1
-            publish(handle, message)
+        def counting(outlets: Outlets, topic: str, *given: Any, publish: Any = publish) -> None:
+            published[outlets.full[topic]] += 1
+            publish(outlets, topic, *given)
+            if topic == "motor_states":
+                written[topic] = outlets.written[topic]
+                if published["/wam/motor_states"] == 100:
+                    others.append(Node("other", namespace="wam", context=arm.context))
+                    others[0].create_subscription(JointState, topic, heard.append, 10)
+                elif published["/wam/motor_states"] == 200:
+                    others[0].destroy_node()
 
-        monkeypatch.setattr(_rclpy.Publisher, form, counting)
+        monkeypatch.setattr(Outlets, form, counting)
     bag = arm.play([{"name": "speak", "seconds": 0.3}])
     recorded = dict(read(bag.path, ()).counts)
-    assert published["/wam/motor_states"] == 301
+    assert published["/wam/motor_states"] == 301 > written["motor_states"] >= 100
     assert {name: published[name] for name in recorded} == recorded
+    assert bag.losses.sentences(0) == []
 
 
 @pytest.mark.parametrize(
