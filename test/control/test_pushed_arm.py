@@ -71,12 +71,14 @@ def test_a_rod_that_comes_from_the_side_to_an_arm_that_presses_is_given_way_to(
     assert peak > before
 
 
-def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force() -> None:
+@pytest.mark.parametrize(("cover", "place"), [(OUTER, 0.35), (INNER, 0.5)])
+def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force(cover: str, place: float) -> None:
+    """On the inner link no torque shows the position: the force counts that explains them at its far end."""
     step = ScenarioStep("rest", 3.5)
-    peak, reactions = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 20.0})
+    peak, reactions = pushed(step, cover, place, **{"force_loop:limits.contact_force": 20.0})
     assert peak < 30.0
     assert Code.PUSHED in reactions
-    peak, _ = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 1e6})
+    peak, _ = pushed(step, cover, place, **{"force_loop:limits.contact_force": 1e6})
     assert peak > 100.0
 
 

@@ -79,11 +79,8 @@ class PushedArm:
         self._since += dt
         is_new = self._since > own.limits.settling_time
         certain = certain_size(torques, torque_sd)
-        jacobians = [self._jacobian(q, axes, contact)] if certain else []
-        if certain and chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
-            jacobians.append(likeliest_link(self._body, q, torques))
-        levers = [largest_lever(jacobian) for jacobian in jacobians]
-        hardest = certain / min(levers) if certain else 0.0  # the least force that explains what is certain
+        levers = self._levers(q, axes, torques, contact, chi2) if certain else [math.inf]
+        hardest = certain / min(levers)  # the least force that explains what is certain
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
         allowed = max(bound[0], self._allowed * (1.0 - fade))
@@ -103,16 +100,26 @@ class PushedArm:
         if length(tool - self._from) > own.limits.free_travel:
             return []
         along, fastest = torques / length(torques), own.joint_speed_limit
-        # no faster against it than a force law allows up to this force, and above it away from it
-        return [VelocityRow(along, min(gain * (certain / lever - allowed) / lever, fastest)) for lever in levers]
+        # no faster against it than a force law allows up to this force, and above it away from it; with the gain of the
+        # longest lever, since what pushes may be anywhere
+        away = gain * (certain - allowed * min(levers)) / max(levers) ** 2
+        return [VelocityRow(along, min(away, fastest))]
 
-    def _jacobian(self, q: Angles, axes: Sequence[CommandedAxis], contact: Contact) -> Array:
-        """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""
-        places = {axis.place[:2] for axis in axes if axis.place and axis.place.is_known}
-        if len(places) == 1:
-            cover, position = places.pop()
-        elif contact.cover and not math.isnan(contact.position):
-            cover, position = contact.cover, contact.position
-        else:
-            return self._body.tool_jacobian(q)
-        return self._body.point_jacobian(q, cover, (position, 0.0, 0.0))
+    def _levers(
+        self, q: Angles, axes: Sequence[CommandedAxis], torques: Array, contact: Contact, chi2: float
+    ) -> list[float]:
+        """Largest torque per force, m: at the one known force, at the estimated contact, or wherever else it may push.
+
+        Without a position, that is at the tool, and at the far end of a link that is known.
+        """
+        body, places = self._body, {axis.place[:2] for axis in axes if axis.place and axis.place.is_known}
+        cover, position = places.pop() if len(places) == 1 else contact[:2]
+        jacobians = []
+        if math.isnan(position):
+            jacobians.append(body.tool_jacobian(q))
+            position = body.arm.covers.length_of(cover) if cover else position
+        if cover:
+            jacobians.append(body.point_jacobian(q, cover, (position, 0.0, 0.0)))
+        if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
+            jacobians.append(likeliest_link(body, q, torques))
+        return [largest_lever(jacobian) for jacobian in jacobians]
