@@ -319,9 +319,10 @@ class StabilityGuard:
         most = self.accepted_scale(found)
         surface = f"contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         return (
-            f"force_gain {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one: domain "
-            f"{found.domain}; allowed: force_gain up to {listed([rounded_down(most * each) for each in law.gain])}; "
-            f"guard.stability_fraction is {self.parameters.stability_fraction:g}; worst case: {found.where}, {surface}"
+            f"force_gain {listed(law.gain)} is {1.0 / found.scale:.3g} times the largest linearly stable one, above "
+            f"guard.stability_fraction, {self.parameters.stability_fraction:g}, so it counts as domain {found.domain}; "
+            f"allowed: force_gain up to {listed([rounded_down(most * each) for each in law.gain])}; "
+            f"worst case: {found.where}, {surface}"
         )
 
     def _hopeless(self, task: GuardedTask, contacts: Sequence[GuardedContact], found: GuardAssessment) -> str:
