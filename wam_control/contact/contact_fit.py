@@ -111,7 +111,7 @@ class _Link(NamedTuple):
     gram : 5 by 5, or larger.
     precision : 1/N^2, of the prior of each component of the force.
     constant : log of the probability of the torques without a force across.
-    terms : (15,), coefficients of 1, x, x^2 in G^T W G + precision, 11, 12, 22, and in G^T W r, 1, 2, with G = A + x B.
+    terms : (13,), coefficients of 1, x, x^2 in G^T W G + precision, 11, 12, 22, with G = A + x B; of 1, x in G^T W r.
     """
 
     gram: Gram
@@ -124,32 +124,36 @@ class _Link(NamedTuple):
         """The link of the first five columns of Z."""
         r, a1, a2, b1, b2 = gram[:5]
         n11, n12 = (a1[1] + precision, 2.0 * a1[3], b1[3]), (a1[2], a1[4] + a2[3], b1[4])
-        terms = (*n11, *n12, a2[2] + precision, 2.0 * a2[4], b2[4], r[1], r[3], 0.0, r[2], r[4], 0.0)
+        terms = (*n11, *n12, a2[2] + precision, 2.0 * a2[4], b2[4], r[1], r[3], r[2], r[4])
         return cls(gram, precision, math.log(precision) - 0.5 * (r[0] + volume), terms)
+
+    def _equations(self, x: float) -> tuple[float, float, float, float, float, float]:
+        """Elements 11, 12, 22 of G^T W G + precision at position x, 1, 2 of G^T W r, and the determinant."""
+        p0, p1, p2, q0, q1, q2, s0, s1, s2, c0, c1, e0, e1 = self.terms
+        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
+        return n11, n12, n22, c0 + x * c1, e0 + x * e1, n11 * n22 - n12 * n12
 
     def force(self, x: float) -> tuple[float, Pair, Triple]:
         """Of the most likely force at position x: the part of r^T W r it explains, it, its covariance 11, 12, 22."""
-        p0, p1, p2, q0, q1, q2, s0, s1, s2, c0, c1, _, e0, e1, _ = self.terms
-        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
-        torque1, torque2 = c0 + x * c1, e0 + x * e1
-        determinant = n11 * n22 - n12 * n12
+        n11, n12, n22, torque1, torque2, determinant = self._equations(x)
         f1, f2 = (n22 * torque1 - n12 * torque2) / determinant, (n11 * torque2 - n12 * torque1) / determinant
         return f1 * torque1 + f2 * torque2, (f1, f2), (n22 / determinant, -n12 / determinant, n11 / determinant)
 
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link."""
-        explained, _, (s11, s12, s22) = self.force(x)
-        return 0.5 * (explained + math.log(s11 * s22 - s12 * s12))
+        n11, n12, n22, torque1, torque2, determinant = self._equations(x)
+        explained = n22 * torque1 * torque1 - 2.0 * n12 * torque1 * torque2 + n11 * torque2 * torque2
+        return 0.5 * (explained / determinant - math.log(determinant))
 
     def torque_position_sd(self, x: float, force: Pair) -> float:
         """Standard deviation of the position, m, by the torques alone, the force unknown: a Schur complement.
 
         Not by a pseudo-inverse of the whole information, which is small exactly where the position is undetermined.
         """
-        p0, p1, p2, q0, q1, q2, s0, s1, s2, *_ = self.terms
+        n11, n12, n22, *_ = self._equations(x)
         _, a1, a2, b1, b2 = self.gram[:5]
         (f1, f2), less = force, self.precision * (1.0 - CONTACT.weak_prior)
-        n11, n12, n22 = p0 + x * (p1 + x * p2) - less, q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2) - less
+        n11, n22 = n11 - less, n22 - less
         v1 = f1 * (a1[3] + x * b1[3]) + f2 * (a1[4] + x * b1[4])
         v2 = f1 * (a2[3] + x * b1[4]) + f2 * (a2[4] + x * b2[4])
         known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
@@ -204,10 +208,6 @@ class ContactFit:
             (lean, arm, x, width, _log(parameters.along_weight / (count * width)))
             for lean, arm, x, width, count in pieces
         ]
-        steps = (np.arange(parameters.positions) + 0.5) / parameters.positions  # the middle of each
-        row = np.array([a + (b - a) * steps for a, b in self._ends])
-        self._row = row.tolist()
-        self._powers = np.stack((np.ones_like(row), row, row * row), axis=1)
 
     def __call__(self, gram: Array, other: float = -math.inf) -> list[Fit]:
         """Fit a contact to each link.
@@ -220,8 +220,8 @@ class ContactFit:
         grams: list[Gram] = gram.tolist()
         links = [self._link(i, one) for i, one in enumerate(grams)]
         pieces, left = self._along(grams[-1])
-        for i, (link, values) in enumerate(zip(links, self._log_density(links), strict=True)):
-            pieces += self._grid(i, link, values)
+        for i, link in enumerate(links):
+            pieces += self._grid(i, link)
         pieces.sort(reverse=True)
         floor = pieces[0][0] - CONTACT.search_depth
         pieces = [piece for piece in pieces if piece[0] > floor]
@@ -254,31 +254,23 @@ class ContactFit:
         """Log of how much rarer a force of a size, N, is: above its scale in inverse proportion to the size."""
         return math.log(max(size / self._given.force_scale, 1.0))
 
-    def _log_density(self, links: Sequence[_Link]) -> list[list[float]]:
-        """`_Link.log_density` of all pieces of the grid."""
-        terms = np.array([link.terms for link in links]).reshape(-1, 5, 3) @ self._powers
-        n11, n12, n22, c1, c2 = terms.transpose(1, 0, 2).copy()  # numpy takes rows that lie apart more slowly
-        determinant = n11 * n22 - n12 * n12
-        explained = (n22 * c1 * c1 - 2.0 * n12 * c1 * c2 + n11 * c2 * c2) / determinant
-        found: list[list[float]] = (0.5 * (explained - np.log(determinant))).tolist()
-        return found
-
-    def _grid(self, i: int, link: _Link, values: list[float]) -> list[Piece]:
+    def _grid(self, i: int, link: _Link) -> list[Piece]:
         """Pieces with a contact from the side; a peak that is narrower than some is divided into pieces of its own.
 
         Where two links meet, a contact is more frequent than elsewhere along them.
         """
-        x, (start, end) = self._row[i], self._ends[i]
-        width = (end - start) / len(x)
+        low, high = start, end = self._ends[i]
+        count = self._given.positions
         for refined in range(CONTACT.refinements + 1):
+            width = (high - low) / count
+            x = [low + (k + 0.5) * width for k in range(count)]
+            values = [link.log_density(place) for place in x]
             floor = max(values) - CONTACT.search_depth
             likely = [(value, place) for value, place in zip(values, x) if value > floor]  # noqa: B905
             if len(likely) >= CONTACT.few_positions or refined == CONTACT.refinements:
                 break
             low, high = max(likely[0][1] - width, start), min(likely[-1][1] + width, end)
-            width = (high - low) / CONTACT.peak_positions
-            x = [low + (k + 0.5) * width for k in range(CONTACT.peak_positions)]
-            values = [link.log_density(place) for place in x]
+            count = CONTACT.peak_positions
         constant = link.constant + self._frequency[i]
         pieces = [(value + constant, place, width, i, False) for value, place in likely]
         constant, width = link.constant + self._end_frequency, CONTACT.end_length
@@ -340,7 +332,7 @@ class ContactFit:
         place = min(max(place, start), end)
         variance = max(0.0, (part.second - 2.0 * place * part.first) / part.mass + place * place)
         explained, force, (s11, s12, s22) = link.force(place)
-        step = 0.5 * (end - start) / len(self._row[0])
+        step = 0.5 * (end - start) / self._given.positions
         _, ahead, _ = link.force(place + step)
         d1, d2 = (ahead[0] - force[0]) / step, (ahead[1] - force[1]) / step
         size = math.hypot(*force) + CONTACT.smallest_force

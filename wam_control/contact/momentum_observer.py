@@ -5,8 +5,8 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
-from operator import sub
-from typing import Final
+from operator import add, sub
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,16 +170,16 @@ class MomentumObserver:
             links = self._side.links(driven, speed, last.links, span)
             momentum = (links.momentum + rotors.dot(speed)).tolist()
             inertia, speed, qd = driven + rotors, links.velocity, links.velocity.tolist()
-        known = bias = body.momentum_bias(at, speed).tolist()
-        if friction:
-            known = list(map(sub, bias, friction))
+        bias = body.momentum_bias(at, speed).tolist()
+        external, model, before = [0.0] * self._n, [-torque for torque in bias], qd
         if self._filters.count:
-            model = left = _unexplained(momentum, last.momentum, bias, last.bias, span)
+            before = last.qd
+            changes, meant = map(sub, momentum, last.momentum), map(add, bias, last.bias)
+            model = [change / span - 0.5 * twice for change, twice in zip(changes, meant)]  # noqa: B905
+            external = list(map(sub, model, tau))
             if friction:
-                left = _unexplained(momentum, last.momentum, known, last.known, span)
-            external, before = list(map(sub, left, tau)), last.qd
-        else:
-            external, model, before = [0.0] * self._n, [-torque for torque in bias], qd
+                resisted = map(add, friction, last.friction)
+                external = [each + 0.5 * twice for each, twice in zip(external, resisted)]  # noqa: B905
         present = [*external, *model, *q]
         if not math.isfinite(sum(momentum, sum(present))):
             self._gap += dt
@@ -187,7 +187,7 @@ class MomentumObserver:
         if friction:
             present += [*qd, *(change / span for change in map(sub, qd, before))]
         self._filters.take(present, signals, span)
-        self._last, self._gap = _Sample(q, qd, momentum, inertia, known, bias, links), 0.0
+        self._last, self._gap = _Sample(q, qd, momentum, inertia, bias, friction, links), 0.0
         self.age += span
         return True
 
@@ -258,21 +258,13 @@ class MomentumObserver:
         return ""
 
 
-def _unexplained(
-    momentum: list[float], before: list[float], torque: list[float], torque_before: list[float], span: float
-) -> list[float]:
-    """Torques (n,), N m, besides a known one that change a momentum (n,), N m s, within a span, s."""
-    each = zip(momentum, before, torque, torque_before)  # noqa: B905 - it takes as long as the work on four numbers
-    return [(now - then) / span - 0.5 * (one + other) for now, then, one, other in each]
-
-
 def _low_pass(before: list[float], present: list[float], keep: float) -> list[float]:
     """Filtered values of which the share `keep` stays: in a list, they take half the time of an array."""
     take = 1.0 - keep
     return [keep * old + take * new for old, new in zip(before, present)]  # noqa: B905 - as above
 
 
-class _Sample:
+class _Sample(NamedTuple):
     """The last sample that was taken.
 
     Attributes
@@ -280,23 +272,17 @@ class _Sample:
     q, qd : of the joints, (n,), rad, rad/s.
     momentum : (n,), N m s; before the first sample it is empty, as what follows but the inertia.
     inertia : (n, n), kg m^2.
-    known : torques of the model, (n,), N m, with friction.
-    bias : the same without friction.
+    bias, friction : torques of the model, (n,), N m; friction is empty with joint sensors.
     links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
-    def __init__(
-        self,
-        q: list[float],
-        qd: list[float],
-        momentum: list[float],
-        inertia: Array,
-        known: list[float],
-        bias: list[float],
-        links: LinkMotion | None,
-    ) -> None:
-        self.q, self.qd, self.momentum, self.inertia = q, qd, momentum, inertia
-        self.known, self.bias, self.links = known, bias, links
+    q: list[float]
+    qd: list[float]
+    momentum: list[float]
+    inertia: Array
+    bias: list[float]
+    friction: list[float]
+    links: LinkMotion | None
 
 
 class _Filters:

@@ -33,12 +33,16 @@ class VelocityFit:
         """Forget the samples, not the error of the angles."""
         self._samples: deque[tuple[float, State]] = deque(maxlen=2 * CONTACT.half_windows[-1] + 1)
         self._time, self._middle = 0.0, math.nan
-        self._period = self._scale = self.delay = 0.0
+        self._period, self.delay = math.inf, 0.0
 
     @property
     def sd(self) -> list[float]:
         """Standard deviation of the velocity of each shaft, rad/s."""
-        return [self._scale * mean for mean in self._third]
+        half = CONTACT.half_windows[self._choice]
+        # half a window and more: sum of the squared distances from the middle; none: a difference of two
+        squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
+        per_mean = THIRD / (math.sqrt(squares) * self._period)
+        return [per_mean * mean for mean in self._third]
 
     def take(self, state: State, dt: float) -> tuple[State, float] | None:
         """Take a sample `dt` seconds after the last; None while the window fills or grows.
@@ -78,22 +82,12 @@ class VelocityFit:
                     if not size < CONTACT.largest_step:
                         continue
                     third[i] = mean + (CONTACT.follow_up if size > mean else CONTACT.follow_down) * (size - mean)
-        if dt != self._period:
-            self._period, self._scale = dt, self._sd_per_mean(dt)
-        longer = self._choice + 1
-        if longer == len(CONTACT.half_windows):
-            return
+        self._period, longer = dt, self._choice + 1
         if (
-            self._scale * max(self._third) > CONTACT.velocity_sd
+            longer < len(CONTACT.half_windows)
             and 2 * CONTACT.half_windows[longer] * dt < CONTACT.longest_window
+            and max(self.sd) > CONTACT.velocity_sd
         ):
             if self._choice == 0:
                 self._middle = self._time
             self._choice = longer
-            self._scale = self._sd_per_mean(dt)
-
-    def _sd_per_mean(self, dt: float) -> float:
-        half = CONTACT.half_windows[self._choice]
-        # half a window and more: sum of the squared distances from the middle; none: a difference of two
-        squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
-        return THIRD / (math.sqrt(squares) * dt)
