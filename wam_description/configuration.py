@@ -248,12 +248,12 @@ def _changes(name: str, old: Any, new: Any) -> list[str]:
     Of a list of nodes, what is gone and what is new.
     """
     is_list = isinstance(old, list) and isinstance(new, list)
+    if is_list and name == "nodes" and {*old} != {*new}:
+        gone, more = (", ".join(one for one in a if one not in b) for a, b in ((old, new), (new, old)))
+        return [f"  {name}: {'; '.join([f'without {gone}'] * bool(gone) + [f'also {more}'] * bool(more))}"]
     if is_list and len(old) == len(new):
         pairs = enumerate(zip(old, new, strict=True))
         return [f"  {name}[{i}]: {one}, now {other}" for i, (one, other) in pairs if one != other]
-    if is_list and name == "nodes":
-        gone, more = (", ".join(one for one in a if one not in b) for a, b in ((old, new), (new, old)))
-        return [f"  {name}: {'; '.join([f'without {gone}'] * bool(gone) + [f'also {more}'] * bool(more))}"]
     change = f"added, {new}" if old is None else f"{old}, now {new}"
     return [f"  {name}: {textwrap.shorten(change, FILES.longest_difference)}"]
 

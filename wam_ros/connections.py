@@ -3,6 +3,9 @@
 from collections.abc import Collection, Iterable
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+
 from wam_description.event import RAISED, Event
 from wam_description.interface import Interface
 from wam_description.signals import NodeStatus
@@ -17,7 +20,7 @@ from wam_ros.messages import Refused
 from wam_ros.network import Place
 from wam_ros.outlets import Outlets
 from wam_ros.priority import OWN, PRIORITY
-from wam_ros.ros_parameters import declare
+from wam_ros.ros_parameters import declare, refusal
 from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import status_of
 
@@ -154,6 +157,12 @@ class StackNode(TolerantNode):
             self._readiness.cancel()
             self.health.is_ready = True
             self.report_ready()
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """As that of rclpy; a value that is not allowed is named, with those that are."""
+        if reason := refusal(self.own, parameter_list):
+            return SetParametersResult(successful=False, reason=reason)
+        return super().set_parameters_atomically(parameter_list)
 
     def report_ready(self) -> None:
         """All peers are connected."""

@@ -1,6 +1,6 @@
 """ROS parameters from parameter classes: declared, described, checked as a set."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -9,7 +9,7 @@ from rclpy.parameter import Parameter
 
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED
-from wam_description.parameters import Field, ParameterError, build, fields, listed, values
+from wam_description.parameters import Field, ParameterError, build, checked, fields, listed, values
 from wam_description.wiring import raised
 
 T = TypeVar("T")
@@ -60,6 +60,21 @@ def descriptor(field: Field) -> ParameterDescriptor:
     if field.kind is int and abs(field.low) < 2**62 and abs(field.high) < 2**62:
         result.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
     return result
+
+
+def refusal(own: Any, parameters: Iterable[Parameter]) -> str:
+    """Why a value of a live parameter cannot be taken, whatever the others are; '' where all can.
+
+    rclpy would report it as out of range, without the value or the range.
+    """
+    given = {parameter.name: _plain(parameter) for parameter in parameters}
+    try:
+        for field in fields(type(own)):
+            if field.live and field.name in given:
+                checked(field, given[field.name])
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def follow(node: Node, own: Any, take: Any, report: Callable[[Mapping[str, Any]], None] = lambda values: None) -> None:

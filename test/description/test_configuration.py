@@ -311,10 +311,12 @@ def test_a_file_shows_what_it_changes_and_asks_about_the_mass_of_a_longer_link(
     arm: str, is_open: bool, tmp_path: Path
 ) -> None:
     file = tmp_path / "mine.yaml"
-    file.write_text(f"base: wam\n/**: {{ros__parameters: {{arm: {{{arm}}}}}}}\n")
+    nodes = [name.replace("gravity", "scenario") for name in Configuration.load(packaged("wam")).shared.nodes]
+    file.write_text(f"base: wam\n/**: {{ros__parameters: {{arm: {{{arm}}}, nodes: {nodes}}}}}\n")
     lines = differences(file, Configuration.load(file))
     assert lines[0] == f"{file} differs from wam:"
     assert {"  arm.covers.length[1]: 0.4064, now 0.5", "  arm.tool[0]: 0.4064, now 0.5"} <= set(lines)
+    assert "  nodes: without gravity; also scenario" in lines
     assert ("as heavy as before?" in lines[-1]) == is_open
     for name in ("wam", "barrett-wam7"):
         assert differences(packaged(name), Configuration.load(packaged(name))) == []
