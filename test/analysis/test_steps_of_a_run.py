@@ -525,7 +525,7 @@ stoppable_report(Path("{bag}"), False, None)
 def test_good_run_has_a_good_verdict():
     summary = Played().summary()
     assert verdict(summary) == (
-        "force within 10 %: YES (5.0 %) | correct link: YES (98 % of contact time, required: 50 %) | "
+        "force within 10 %: YES (5.0 %) | correct link: YES (98 % of each contact, required: 50 %) | "
         "position within 4 cm: YES (2.0 cm), contact 2 (inner_link) not evaluated: position unknown | "
         f"at most 10 % false contact: YES (1.4 % of the time without contact) | {NO_LIMIT}"
     )

@@ -185,7 +185,7 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     if answer.result is not VerdictResult.YES:
         return answer
     least = 100.0 * min(one.right for one in lasting)
-    return answer._replace(worst=f"{least:.3g} % of contact time, required: {100.0 * TOUCH.lasting:g} %")
+    return answer._replace(worst=f"{least:.3g} % of each contact, required: {100.0 * TOUCH.lasting:g} %")
 
 
 def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
