@@ -455,10 +455,7 @@ class ForceLoop:
             each = zip(self._body.arm.joints.names, self._admission.posture, rates, self._q, strict=True)
             moving = [(name, "rad", goal, speed, at, *law) for name, goal, speed, at in each]
         lasting = FORCE.quarter * own.limits.settling_time
-        events = [
-            run.motions[i].step(name, unit, goal, speed, at, gain, fastest, lasting, given.dt)
-            for i, (name, unit, goal, speed, at, gain, fastest) in enumerate(moving)
-        ]
+        events = [run.motions[i].step(*each, lasting, given.dt) for i, each in enumerate(moving)]
         return [event for event in events if event]
 
     def _advised(self, found: list[Event], task: TaskCommand | None) -> list[Event]:
