@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.thresholds import CONTACT
-from wam_description.small_matrices import inverse
+from wam_description.small_matrices import inverse, solution
 
 Array = NDArray[np.float64]
 
@@ -234,7 +234,7 @@ def _sides(rows: Array, places: Array) -> tuple[Array, Array]:
 
 def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
     """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
-    weighted = np.linalg.solve(covariance + slips.T.dot(slips), before)
+    weighted = solution(covariance + slips.T.dot(slips), before)
     return float(torques.dot(weighted)) / float(before.dot(weighted))
 
 
@@ -247,7 +247,7 @@ def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> flo
     covariance : (m, m), N^2 m^2, if it does not slide, whatever its force and position.
     slide : (m,), N m, torques of the standard deviation of its speed.
     """
-    weighted = np.linalg.solve(covariance, slide)
+    weighted = solution(covariance, slide)
     gain = float(slide.dot(weighted))
     evidence = 0.5 * (float(torques.dot(weighted)) ** 2 / (1.0 + gain) - math.log1p(gain))
     odds = (

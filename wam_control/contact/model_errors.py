@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from wam_control.contact.model_prior import ModelPrior
 from wam_control.contact.thresholds import CONTACT
+from wam_description.small_matrices import solution
 
 Array = NDArray[np.float64]
 
@@ -133,7 +134,7 @@ class ModelErrors:
         self.errors, self.covariance = elsewhere
         self._pose = _Pose(seen.pose, elsewhere=elsewhere)
         innovation, covariance = self.corrected(seen)
-        statistic = float(innovation.dot(np.linalg.solve(covariance, innovation)))
+        statistic = float(innovation.dot(solution(covariance, innovation)))
         self.covariance = self.covariance * max(1.0, statistic / detect)
         self._take(*self.corrected(seen), seen)
 
@@ -208,7 +209,7 @@ class ModelErrors:
         innovation, covariance = self.corrected(seen)
         # of a shaft at rest stiction hides the errors
         rate = span / CONTACT.trust_time * float(seen.moving.min())
-        squared = float(innovation.dot(np.linalg.solve(covariance, innovation))) / len(innovation)
+        squared = float(innovation.dot(solution(covariance, innovation))) / len(innovation)
         self.size = min(max(self.size + rate * (CONTACT.margin * squared - self.size), 1.0), CONTACT.largest_size)
         rate = span / CONTACT.noise_time
         at_motors = self._to_motors.dot(innovation)

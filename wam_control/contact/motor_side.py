@@ -13,6 +13,7 @@ from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
 from wam_description.signals import State
+from wam_description.small_matrices import solution
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
@@ -138,6 +139,6 @@ class MotorSide:
             return LinkMotion(driven, inertia.dot(driven), np.zeros(len(driven)))
         lasts = dt + CONTACT.cable_damping
         given, held = before.momentum + dt * before.torque, dt * lasts * self._stiffness
-        velocity = np.linalg.solve(inertia + held, given + held.dot(driven))
+        velocity = solution(inertia + held, given + held.dot(driven))
         momentum = inertia.dot(velocity)
         return LinkMotion(velocity, momentum, before.torque + (momentum - given) / lasts)

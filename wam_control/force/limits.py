@@ -11,7 +11,7 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.small_matrices import length
+from wam_description.small_matrices import largest_eigenvalue, length
 
 
 def joint_bounds(
@@ -113,7 +113,7 @@ def certain_size(torques: Array, torque_sd: Array) -> float:
 
 def largest_lever(jacobian: Array) -> float:
     """Largest torque on the joints per force, m, at a point with this Jacobian (3, n)."""
-    return max(math.sqrt(np.linalg.eigvalsh(jacobian.dot(jacobian.T))[-1]), FORCE.least_lever)
+    return max(math.sqrt(largest_eigenvalue(jacobian.dot(jacobian.T))), FORCE.least_lever)
 
 
 def likeliest_link(body: RigidBody, q: Angles, torques: Array) -> Array:

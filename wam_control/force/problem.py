@@ -15,7 +15,7 @@ import quadprog
 
 from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import Array
-from wam_description.small_matrices import inverse, length, outer
+from wam_description.small_matrices import inverse, length, outer, solution
 
 RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
 
@@ -76,7 +76,7 @@ def unlimited(rows: Sequence[VelocityRow], posture: Array) -> Array:
     if len(rows) == 1:  # in closed form, so that one axis has the bits of its law
         along, speed = rows[0]
         return posture + along * ((speed - along.dot(posture)) / along.dot(along))
-    return np.asarray(np.linalg.solve(*_normal(rows, posture)), np.float64) if rows else posture
+    return solution(*_normal(rows, posture)) if rows else posture
 
 
 def _used(rows: Sequence[VelocityRow]) -> list[VelocityRow]:
