@@ -13,6 +13,7 @@ from foreign_bags import MOTORS, ORIGIN, Sent, by_json, by_mcap_ros2, by_rosbags
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.finding import Finding
 from wam_analysis.findings.page import page
+from wam_analysis.foreign.clocks import rising
 from wam_analysis.foreign.topic_map import TopicMap, topic_map
 from wam_bag import rosbags_file
 from wam_bag.bag import BagError
@@ -366,6 +367,8 @@ def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
     happened = " ".join(line for section in analysis.sections[:2] for line in section.sentences)
     assert "/joint_states: b without a value that is a number." in happened
     assert f"/wrench: {len(time)} forces, none of which is a number." in happened
+    stamps = ORIGIN + 10**7 * np.arange(100)
+    assert np.array_equal(rising(np.where(np.arange(100) % 5 == 3, 0, stamps), stamps + 800_000), stamps)
 
 
 def quiet(path: Path, *commands: str) -> Analysis:

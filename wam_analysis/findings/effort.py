@@ -89,7 +89,7 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
         return f"{part}, or for fewer than {SHAFT.fewest_samples} samples apart from its reversals"
     finite = _stated([number for number in numbers[:2] if math.isfinite(number[2].error)])
     large = f"the errors are too large{f' ({finite})' * bool(finite)}"
-    return f"{large}; the model leaves {100.0 * unexplained:.2g} % of the effort unexplained"
+    return f"{large}; the model leaves {shown(100.0 * unexplained, '%')} of the effort unexplained"
 
 
 def _limited(source: Source) -> str:
@@ -120,17 +120,19 @@ def contradiction(source: Source) -> str:
 def _lost_way(piece: Piece, unit: str) -> str:
     """Where the position moves least as the velocity has it, and by how much each; '' where they agree.
 
-    A velocity that is late differs only as far as it changes meanwhile.
+    A velocity of another scale, or one that is late, differs alike all the time.
     """
     time, velocity, period = piece.time, piece.values["velocity"], piece.period
     width = max(1, round(SHAFT.way / period))
     if len(time) <= width:
         return ""
     moved, by = ways(piece, width)
-    path = np.concatenate(([0.0], np.cumsum(np.abs(0.5 * period * (velocity[1:] + velocity[:-1])))))
-    far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
-    allowed = SHAFT.agree * far + max(SHAFT.longest_effort_lag, period) * np.abs(change) + SHAFT.joint_rest * SHAFT.way
-    excess = np.abs(moved - by) - allowed - SHAFT.noisy * piece.noise["position"]
+    speeds = np.abs(velocity)
+    far, change = np.convolve(speeds[1:], np.full(width, period), "valid"), velocity[width:] - velocity[:-width]
+    columns = np.column_stack([by, change])
+    off = np.abs(moved - columns @ np.linalg.lstsq(columns, moved, rcond=None)[0])
+    allowed = SHAFT.late * far + period * np.abs(change) + SHAFT.joint_rest * SHAFT.way
+    excess = off - allowed - SHAFT.noisy * piece.noise["position"]
     if 2 * np.sum(excess > 0.0) < width:
         return ""
     worst = int(np.argmax(excess))

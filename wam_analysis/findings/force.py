@@ -221,7 +221,7 @@ def _fate(one: HeldForce) -> tuple[str, Verdict]:
         )
     shaft, seen = one.swinging
     fate = seen.verdict if seen.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED) else Verdict.SETTLED
-    text = f"{name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {_words(seen)}"
+    text = f"{name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {fate_words(seen)}"
     if shaft and fate is not Verdict.SETTLED:
         what = "limit cycle of" if seen.verdict is Verdict.LIMIT_CYCLE else "last"
         text += f"; {what} {shown(seen.peak_to_peak, 'rad')} peak to peak, period {shown(seen.period, 's')}"
@@ -236,7 +236,8 @@ def _fate(one: HeldForce) -> tuple[str, Verdict]:
     return f"{text}.", fate
 
 
-def _words(seen: Swings) -> str:
+def fate_words(seen: Swings) -> str:
+    """Whether a force settles, in words."""
     return {
         Verdict.SETTLED: "settles",
         Verdict.LIMIT_CYCLE: "oscillates with constant amplitude",

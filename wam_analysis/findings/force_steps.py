@@ -6,24 +6,33 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, counted, shown, times
-from wam_analysis.foreign.sources import Source, pieces
+from wam_analysis.findings.force import fate_words
+from wam_analysis.findings.repetition import is_known
+from wam_analysis.foreign.sources import Source, jumps, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.response import StepResponse, step_response
+from wam_analysis.measures.runs import noise
+from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import HOLD
+from wam_analysis.thresholds import HOLD, SHAFT, STREAM
 from wam_bag.arrays import Numbers
+from wam_theory.verdicts import Verdict
 
 FORCE = ("force.x", "force.y", "force.z")
 
 
 class ForceStep(NamedTuple):
-    """A step of a command at a time, s, and its response, N, with the signs of the axis of the change."""
+    """A step of a command at a time, s, and its response, N, with the signs of the axis of the change.
+
+    What was commanded before is NaN where that was not recorded.
+    """
 
     label: str
     begin: float
     before: float
     commanded: float
     response: StepResponse
+    swings: Swings
 
     @property
     def error(self) -> float:
@@ -79,8 +88,12 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
             after = (piece.time >= begin) & (piece.time < end)
             if np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
-            response = _response(piece.time[after] - begin, value[after], before, size)
-            found.append(ForceStep(measured.label, begin, float(last @ way), float(desired[row] @ way), response))
+            time, reached = piece.time[after] - begin, value[after]
+            response, band = _response(time, reached, before, size), max(HOLD.loud * size, 4.0 * noise(reached))
+            left, to = (float(one @ way) for one in (last, desired[row]))
+            is_first = not row and is_known(command, measured.time)
+            swinging = swings(time, reached - to, 2.0 * band, band)
+            found.append(ForceStep(measured.label, begin, math.nan if is_first else left, to, response, swinging))
     return found
 
 
@@ -95,10 +108,10 @@ def _response(time: Numbers, value: Numbers, before: Numbers, size: float) -> St
 
 def step_section(recording: AnalysedRecording) -> Section:
     """Steps of a commanded force, and how the measured one followed."""
-    states, commands = recording.states, recording.commands
+    forces, commands = [one for one in recording.states if not one.is_joint], recording.commands
     steps: list[ForceStep] = []
-    sentences, findings, doubts, followed = [], [], [], set()
-    for one in (one for one in states if not one.is_joint):
+    sentences, findings, doubts, followed = [], [], list[str](), set()
+    for one in forces:
         if (command := recording.command_of(one)) is not None:
             on_axis = _along(one, command)
             doubts += [
@@ -119,8 +132,11 @@ def step_section(recording: AnalysedRecording) -> Section:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
         settled = ", without staying within 5 % of it" * math.isinf(response.settling)
-        settled += ", without a rise in the recording" * math.isnan(response.settling)
-        sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
+        settled += ", without a lasting rise in the recording" * math.isnan(response.settling)
+        came = f"a step from {shown(step.before, 'N')}{settled}"
+        sentences.append(f"{name}: {'commanded from the beginning' if math.isnan(step.before) else came}.")
+        if step.swings.verdict in (Verdict.DIVERGED, Verdict.LIMIT_CYCLE):
+            doubts.append(f"{name}: the force {fate_words(step.swings)}.")
         findings += [
             Finding(f"{name}: force in the steady state", "N", response.final, step.commanded),
             Finding(f"{name}: rise time 10-90 %", "s", response.rise),
@@ -128,13 +144,41 @@ def step_section(recording: AnalysedRecording) -> Section:
             Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
             Finding(f"{name}: ripple", "N", response.ripple),
         ]
+    shows = []
     if steps:
         worst = max(steps, key=lambda step: step.error)
         error, size = shown(worst.error, "N"), shown(worst.commanded, "N")
-        verdict = f"{counted(len(steps), 'force step')}; the largest steady error is {error} of {size}."
-        return Section("force", "Force", (*sentences, *doubts), findings, (), (verdict,), doubts)
-    hint = "; name the topic of its command with --command" * any(not one.is_joint and not followed for one in states)
-    return Section("force", "Force", doubts or [f"No step of a commanded force was recorded{hint}."], wrong=doubts)
+        shows.append(f"{counted(len(steps), 'force step')}; the largest steady error is {error} of {size}.")
+    elif not doubts:
+        hint = "; name the topic of its command with --command" * bool(forces and not followed)
+        sentences.append(f"No step of a commanded force was recorded{hint}.")
+    doubts += [text for one in forces if (text := _tared(one, recording.command_of(one)))]
+    return Section("force", "Force", (*sentences, *doubts), findings, (), shows, doubts)
+
+
+def _tared(measured: Source, command: Source | None) -> str:
+    """That a force jumps from one message to the next, and does not change about it, where no command changes."""
+    force = measured.only(*FORCE)
+    if not force.values:
+        return ""
+    values = np.array([*force.values.values()])
+    moves = np.array([jumps(force.time, value, HOLD.equal_force) for value in values])
+    rows = np.flatnonzero(np.any(moves, axis=0))
+    after, before = (np.clip(rows + by, 0, len(force.time) - 1) for by in (STREAM.around, -1 - STREAM.around))
+    moved = moves[:, rows]
+    around = np.where(moved, values[:, after] - values[:, before] - moved, 0.0)
+    rows = rows[np.linalg.norm(around, axis=0) < SHAFT.agree * np.linalg.norm(moved, axis=0)]
+    if command is not None and len(rows):
+        changed = np.any([np.diff(value) for value in command.values.values()], axis=0)
+        since = force.time[rows] - command.time[1:][changed][:, np.newaxis]
+        rows = rows[~np.any((since >= 0.0) & (since < HOLD.shortest), axis=0)]
+    if not len(rows):
+        return ""
+    size = shown(float(np.max(np.linalg.norm(moves[:, rows], axis=0))), "N")
+    return (
+        f"{measured.label}: the force jumps from one message to the next {_when(force.time[rows])}, by up to {size}, "
+        "as by a tare or an impact."
+    )
 
 
 def _arrival(command: Source) -> str:
@@ -142,8 +186,12 @@ def _arrival(command: Source) -> str:
     at = command.time[command.arrives & np.any(np.column_stack([*command.values.values()]), axis=1)]
     if not len(at):
         return ""
-    when = f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
     return (
-        f"{command.topic} changes to the frame {command.frame or 'without a name'} {when}; that is not evaluated as "
-        "a step, because what was commanded before is in another frame."
+        f"{command.topic} changes to the frame {command.frame or 'without a name'} {_when(at)}; that is not evaluated "
+        "as a step, because what was commanded before is in another frame."
     )
+
+
+def _when(at: Numbers) -> str:
+    """Some times, s, in words."""
+    return f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"

@@ -165,7 +165,7 @@ def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterato
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:
     """A signal less what follows a command, or the way of a commanded velocity, linearly; None where that is still."""
-    if len(command.time) < SHAFT.fewest_samples or not _is_known(command, piece.time):
+    if len(command.time) < SHAFT.fewest_samples or not is_known(command, piece.time):
         return None
     (known,) = command.values
     desired = held(command, known, piece.time)
@@ -188,7 +188,7 @@ def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:
     """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if it is not known."""
     time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
-    if command is None or not len(command.time) or not _is_known(command, time):
+    if command is None or not len(command.time) or not is_known(command, time):
         return None
     (known,) = command.values
     cycle = limit_cycle(time, held(command, known, time))
@@ -196,7 +196,7 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 
-def _is_known(command: Source, time: Numbers) -> bool:
+def is_known(command: Source, time: Numbers) -> bool:
     """Whether it is known what was commanded at some times.
 
     Of two topics that begin at once either may have the first message.

@@ -91,7 +91,8 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     placed = source.only("position")
     positions = placed.values.get("position", np.zeros(0))
     sd = resolution(positions)
-    moved = next((q for q in ("velocity", "position") if q in source.values), "")
+    moving = [q for q in ("velocity", "position") if q in source.values]
+    moved = max(moving, key=lambda q: np.count_nonzero(np.isfinite(source.values[q])), default="")
     for piece in pieces(source, moved) if moved else ():
         rest, velocity = rest_speed(piece, least), piece.values["velocity"]
         slowest = max(slowest, rest * (rest > least))

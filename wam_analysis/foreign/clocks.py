@@ -117,12 +117,13 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
 def rising(stamps: Times, received: Times) -> Times:
     """The stamps, or the times of reception where the stamps are of a clock that was set, reset or never set.
 
-    A few stamps that are years away from their reception, such as 0, are replaced by it, and so is that of a first
-    message that waited for the recorder.
+    A few stamps that are years away from their reception, such as 0, are replaced by it, less the usual delay, and so
+    is that of a first message that waited for the recorder.
     """
-    away = np.abs(stamps - received) > STREAM.away
+    age = received - stamps
+    away = np.abs(age) > STREAM.away
     if 2 * np.count_nonzero(away) < len(stamps):
-        stamps = np.where(away, received, stamps)
+        stamps = np.where(away, received - int(np.median(age[~away])), stamps)
     steps, arrivals = np.diff(stamps), np.diff(received)
     if not len(steps):
         return stamps

@@ -87,9 +87,13 @@ def _scaled(columns: Any, given: TopicMap) -> Any:
     """The columns in the units that are shown, with the given names of joints that have none."""
     scaled = {q: given.scaled(q)[0] * getattr(columns, q) for q in QUANTITIES if hasattr(columns, q)}
     if UNNAMED in getattr(columns, "irregular", ()) and len(given.joints) == len(columns.names):
-        irregular = {what: n for what, n in columns.irregular.items() if what != UNNAMED}
-        columns = columns._replace(names=given.joints, irregular=irregular)
+        columns = _named(columns)._replace(names=given.joints)
     return columns._replace(**scaled)
+
+
+def _named(columns: JointColumns) -> JointColumns:
+    """The columns of joints whose messages need no names."""
+    return columns._replace(irregular={what: n for what, n in columns.irregular.items() if what != UNNAMED})
 
 
 def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tuple[str, JointColumns | WrenchColumns]]:
@@ -155,8 +159,7 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
         return columns.log_time_ns
     if "," in path:
-        parts = (np.vstack(_numbers(topic, columns, field))[:, 0].astype(np.int64) for field in path.split(",", 1))
-        return joined_times(*parts)
+        return joined_times(*np.vstack(_numbers(topic, columns, path)).T.astype(np.int64))
     stamps = [_at(topic, message, path) for message in columns.messages]
     for whole, rest in PARTS_OF_TIME:
         if hasattr(stamps[0], whole) and hasattr(stamps[0], rest):
@@ -176,9 +179,15 @@ def _frames(columns: Messages) -> Texts:
 
 
 def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
-    """The numbers at a path in each message, none where it has no such field; those of a vector are x, y, z."""
+    """The numbers at a path, or at several, in each message, none where it has no such field.
+
+    Those of a vector are x, y, z.
+    """
     if not path:
         return [np.zeros(0)] * len(columns.messages)
+    if "," in path:
+        rows = zip(*(_numbers(topic, columns, part) for part in path.split(",")), strict=True)
+        return [np.concatenate(row) for row in rows]
     found = []
     for message in columns.messages:
         value: Any = ()
@@ -210,7 +219,7 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
         for (frame, names, _), rows in alike.items()
     ]
     found = joint_columns(columns.log_time_ns, groups)
-    return found if "name" in fields else found._replace(irregular={})
+    return found if "name" in fields else _named(found)
 
 
 def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> WrenchColumns:

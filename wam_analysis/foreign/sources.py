@@ -1,6 +1,7 @@
 """One joint or one wrench of one sender and frame, and what was done to its raw values."""
 
 import math
+from collections.abc import Mapping
 from enum import StrEnum
 from itertools import takewhile
 from typing import NamedTuple
@@ -90,11 +91,15 @@ class Source(NamedTuple):
     velocity_factor: float = math.nan
 
     def only(self, *quantities: str) -> "Source":
-        """The source with those of some quantities that it has, in the messages that have all of them."""
+        """The source with those of some quantities that it has, in the messages that have all of them.
+
+        Where they come in turns it is in those that have the last of them.
+        """
         values = {q: self.values[q] for q in quantities if q in self.values}
-        known = (
-            np.isfinite(np.column_stack([*values.values()])).all(axis=1) if values else np.zeros(len(self.time), bool)
-        )
+        known = _known(self, values)
+        if len(values) > 1 and not np.any(known):
+            values |= {q: _between(self.time, values[q]) for q in [*values][:-1]}
+            known = _known(self, values)
         return self._replace(time=self.time[known], values={q: v[known] for q, v in values.items()})
 
     @property
@@ -142,6 +147,22 @@ class Piece(NamedTuple):
     def period(self) -> float:
         """From sample to sample, s."""
         return float(self.time[1] - self.time[0])
+
+
+def _known(source: Source, values: Mapping[str, Numbers]) -> Mask:
+    """Which messages have all of some values."""
+    nothing = np.full(len(source.time), 0.0 if values else math.nan)
+    return np.asarray(np.isfinite(np.column_stack([nothing, *values.values()])).all(axis=1), np.bool_)
+
+
+def _between(time: Numbers, value: Numbers) -> Numbers:
+    """A value at all times, on straight lines between those of messages that have it, but not over gaps."""
+    rows = np.flatnonzero(np.isfinite(value))
+    if not len(rows):
+        return value
+    after = np.minimum(np.searchsorted(rows, np.arange(len(time))), len(rows) - 1)
+    filled = np.interp(time, time[rows], value[rows], math.nan, math.nan)
+    return np.where(after_gaps(time[rows])[after] & np.isnan(value), math.nan, filled)
 
 
 def _last(stamps: Numbers, time: Numbers) -> Numbers:
@@ -338,21 +359,22 @@ def _treated(one: Source) -> Source:
     if "position" in values and one.units["position"] == "rad":
         position = values["position"].copy()
         known = np.isfinite(position)
-        position[known], wraps, turn = _unwrapped(one.time[known], position[known], one.is_command)
+        speed = np.nan_to_num(values.get("velocity", np.zeros(len(position))))[known]
+        position[known], wraps, turn = _unwrapped(one.time[known], position[known], speed, one.is_command)
         if wraps:
             values["position"] = position
             treated.append(Treated(Treatment.WRAPPED, "position", wraps, size=turn))
     for quantity, value in values.items():
-        if not one.is_command and len(rows := _spikes(value)):
+        if not one.is_command and len(rows := _spikes(one._replace(values=values), quantity)):
             mean, values[quantity] = 0.5 * (value[rows - 1] + value[rows + 1]), value.copy()
             values[quantity][rows] = mean
             size = np.max(np.abs(value[rows] - mean))
             treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
     if "position" in values and not one.is_command:
         shown = one._replace(values=values).only("position", "velocity")
-        jumps = _jumps(shown)
-        if len(sizes := jumps[jumps != 0.0]):
-            values["position"] = values["position"] - np.cumsum(jumps)[row_at(shown.time, one.time)]
+        moves = _jumps(shown)
+        if len(sizes := moves[moves != 0.0]):
+            values["position"] = values["position"] - np.cumsum(moves)[row_at(shown.time, one.time)]
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
     factor, unfit = velocity_fit(one._replace(values=values))
     if unfit and not one.is_command:
@@ -362,9 +384,17 @@ def _treated(one: Source) -> Source:
     return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
 
 
-def _spikes(value: Numbers) -> Index:
-    """Rows of single samples away from both neighbours, by more than all others extend over."""
-    value = np.where(np.isfinite(value), value, math.nan)
+def _spikes(one: Source, quantity: str) -> Index:
+    """Rows of single samples away from both neighbours, by more than all others extend over.
+
+    Those of a position, too, to and from which its zero would move.
+    """
+    if quantity == "position":
+        shown = one.only("position", "velocity")
+        moves = _jumps(shown)
+        if len(rows := np.flatnonzero(moves[:-1] * moves[1:] < 0.0)):
+            return np.asarray(row_at(one.time, shown.time[rows]), np.int64)
+    value = np.where(np.isfinite(one.values[quantity]), one.values[quantity], math.nan)
     steps = np.diff(value)
     away = np.where(steps[1:] * steps[:-1] < 0.0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
     if len(away) < SHAFT.fewest_samples:
@@ -407,40 +437,61 @@ def _overflow(position: Numbers) -> float:
     return float(np.median(np.abs(jumps - 0.5 * (before + after)))) if is_counter else math.nan
 
 
-def _unwrapped(time: Numbers, position: Numbers, is_command: bool) -> tuple[Numbers, int, float]:
-    """An angle without its wraps, their number and the turn: it stays within a turn and jumps by more than half."""
-    steps = np.diff(position)
+def _unwrapped(time: Numbers, position: Numbers, speed: Numbers, is_command: bool) -> tuple[Numbers, int, float]:
+    """An angle without its wraps, their number and the turn: it stays within a turn and jumps by more than half.
+
+    One that moves by more than half a turn from message to message does so by its velocity.
+    """
+    steps, moved = np.diff(position), _moved(time, speed)
     for turn in (*STREAM.turns, math.nan if is_command else _overflow(position)):  # a command may jump
-        jumps = (np.abs(steps) > 0.5 * turn) & ~after_gaps(time)[1:]
-        if not np.any(jumps) or np.ptp(position) > STREAM.within * turn:
+        wraps = (np.abs(steps) > 0.5 * turn) & ~after_gaps(time)[1:]
+        if not np.any(wraps) or np.ptp(position) > STREAM.within * turn:
             continue
-        moved = turn - np.median(np.abs(steps[jumps]))  # in a wrap as much as elsewhere
-        if moved <= STREAM.alike * np.max(np.abs(steps[~jumps]), initial=0.0):
-            return np.unwrap(position, period=turn), int(np.sum(jumps)), turn
+        turned = turn * np.rint((moved - steps) / turn)
+        is_fast = np.any(np.abs(moved) > 0.5 * turn)
+        if is_fast and np.quantile(np.abs(steps + turned - moved), STREAM.evenly) < SHAFT.agree * turn:
+            return position + np.concatenate([[0.0], np.cumsum(turned)]), int(np.count_nonzero(turned)), turn
+        within = turn - np.median(np.abs(steps[wraps]))  # in a wrap as much as elsewhere
+        if within <= STREAM.alike * np.max(np.abs(steps[~wraps]), initial=0.0):
+            return np.unwrap(position, period=turn), int(np.sum(wraps)), turn
     return position, 0, math.nan
 
 
-def _jumps(shown: Source) -> Numbers:
-    """By how much the zero of the position moved before each message, (n,).
+def _moved(time: Numbers, velocity: Numbers) -> Numbers:
+    """By how much a velocity moves a joint from each sample to the next, (n - 1,)."""
+    return 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)
 
-    It is what the velocity does not explain, or, where none was recorded, the steps before and after.
+
+def _jumps(shown: Source) -> Numbers:
+    """By how much the zero of the position moved before each message, (n,): by what the velocity does not explain."""
+    velocity = shown.values.get("velocity", np.zeros(1))
+    return jumps(shown.time, shown.values["position"], SHAFT.joint_rest, velocity if np.any(velocity) else None)
+
+
+def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None = None) -> Numbers:
+    """By how much a signal jumps before each sample, (n,), 0 where it does not.
+
+    It is what its velocity does not explain, or, where none was recorded, the steps before and after.
+
+    Parameters
+    ----------
+    time, value, velocity : (n,).
+    least : a smaller step is no jump.
     """
-    position = shown.values["position"]
-    result = np.zeros(len(position))
-    if len(position) < SHAFT.fewest_samples:
+    result = np.zeros(len(value))
+    if len(value) < SHAFT.fewest_samples:
         return result
-    steps, waits, finest = np.diff(position), np.diff(shown.time), 0.0
-    if np.any(velocity := shown.values.get("velocity", np.zeros(1))):
-        moved = 0.5 * (velocity[1:] + velocity[:-1]) * waits
+    steps, waits, finest = np.diff(value), np.diff(time), 0.0
+    if velocity is not None:
+        moved = _moved(time, velocity)
     else:
         rates = np.pad(steps / waits, STREAM.around, "edge")
         moved = np.median(sliding_window_view(rates, 2 * STREAM.around + 1), axis=1) * waits
         finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
     rest = steps - moved
     usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
-    least = np.maximum(STREAM.beyond * np.abs(moved), max(usual, SHAFT.joint_rest))
-    jumps = (np.abs(rest) > least) & ~after_gaps(shown.time)[1:]
-    result[1:][jumps] = rest[jumps]
+    is_jump = np.abs(rest) > np.maximum(STREAM.beyond * np.abs(moved), max(usual, least))
+    result[1:] = np.where(is_jump & ~after_gaps(time)[1:], rest, 0.0)
     return result
 
 
@@ -590,8 +641,7 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
 def ways(piece: Piece, width: int) -> tuple[Numbers, Numbers]:
     """By how much a joint moves in so many periods, by its position and by its recorded velocity."""
     position, velocity = piece.values["position"], piece.values["velocity"]
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) * piece.period
-    by = np.concatenate(([0.0], np.cumsum(steps)))
+    by = np.concatenate(([0.0], np.cumsum(_moved(piece.time, velocity))))
     return position[width:] - position[:-width], by[width:] - by[:-width]
 
 

@@ -45,7 +45,8 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     """Find the cycle that repeats in a signal.
 
     The period is the lag with the highest autocorrelation, refined over all cycles.  The signal is then
-    folded on it, which averages noise and keeps the height of a sawtooth or a jump.  A linear drift is removed.
+    folded on it, which averages noise and keeps the height of a sawtooth or a jump.  A linear drift is removed; that of
+    a known period together with its first harmonic, which alone looks like a drift, too.
 
     Parameters
     ----------
@@ -64,11 +65,16 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     seconds = float(time[-1] - time[0]) / (n - 1)
     centre = np.linspace(-1.0, 1.0, n)
     flat = value - np.mean(value)
-    flat = flat - centre * float(centre @ flat) / float(centre @ centre)
+    if math.isnan(period):
+        flat = flat - centre * float(centre @ flat) / float(centre @ centre)
     lag = _period(flat) if math.isnan(period) else period / seconds
     if not lag >= CYCLE.shortest_period:
         return NO_CYCLE
     phase = np.arange(n) / lag % 1.0
+    if not math.isnan(period):
+        turn = 2.0 * math.pi * phase
+        drift = np.column_stack([centre, np.cos(turn), np.sin(turn), np.ones(n)])
+        flat = flat - centre * np.linalg.lstsq(drift, flat, rcond=None)[0][0]
     phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
     folded = _fold(flat, phase, phases)
     half = n // 2
