@@ -24,37 +24,34 @@ def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> N
     """By the inverse of the covariance of all rows, whose blocks are written out here."""
     random = np.random.default_rng(3)
     shared = np.diag(random.uniform(0.5, 2.0, 5))
-    same = random.standard_normal(4)
+    # a force along the link alone explains the torques; levers are so long that `UNMEASURED` does not count
+    rows = 1e4 * random.standard_normal((2, 7, 4))
+    rows[:, [0, 6]] = same = 1e4 * random.standard_normal(4)
     moments = []
     for k in range(4):
-        own = np.diag(random.uniform(0.1, 0.4, 4))
-        at = Torques(
-            k * 1.1 * CONTACT.moment_interval, same, random.standard_normal((4, 5)), shared, own, np.full(4, 0.01 * k)
-        )
-        rows = random.standard_normal((2, 7, 4))
-        rows[:, 0] = same
-        moments.append((rows, at))
+        time, own, effects = k * 1.1 * CONTACT.moment_interval, random.uniform(0.1, 0.4, 4), random.normal(size=(4, 5))
+        moments.append(Torques(time, same, effects, shared, np.diag(own), np.full(4, 0.01 * k)))
     fusion = ContactFusion(1.0)
-    for rows, at in moments[:-1]:
+    for at in moments[:-1]:
         fusion.remember(rows, at, [(0.2, 0.0)], 0.0)
-    rows, now = moments[-1]
-    gram = fusion.gram(rows, now)
+    gram = fusion.gram(rows, moments[-1])
     assert gram is not None
     assert fusion.count == 3  # the last but one is too young
     used = [*moments[:2], moments[-1]]
-    effects = np.concatenate([at.effects for _, at in used])
+    effects = np.concatenate([at.effects for at in used])
     covariance = effects @ shared @ effects.T
-    for k, (_, at) in enumerate(used):
+    for k, at in enumerate(used):
         covariance[4 * k : 4 * k + 4, 4 * k : 4 * k + 4] += at.own
-    whole = np.concatenate([rows for rows, _ in used], axis=2)
+    whole = np.concatenate([rows] * 3, axis=2)
     assert gram == pytest.approx(whole @ np.linalg.inv(covariance) @ whole.transpose(0, 2, 1), rel=1e-9)
 
 
 def played(
-    random: np.random.Generator, stays: float, moves: bool = True, count: int = 7, slides: float = 0.0
+    random: np.random.Generator, stays: float, moves: float = 1.0, slides: float = 0.0, is_along: bool = False
 ) -> tuple[list[Hypothesis], ContactFusion]:
     """The best explanation at each moment of a push, whose torques err by a part that stays and one that changes."""
-    inference = ContactInference(WAM, RigidBody(WAM), SMOOTH)
+    inference = ContactInference(WAM, RigidBody(WAM), INFERENCE if is_along else SMOOTH)
+    force, count = (-10.0, 0.0, 0.0) if is_along else FORCE, 7
     own, staying = np.eye(4) * SD**2 * (1.0 - stays), np.eye(4) * SD**2 * stays
     bias = SD * np.sqrt(stays) * random.standard_normal(4)
     found = []
@@ -62,7 +59,7 @@ def played(
         q = START + moves * k * STEP * SPEED
         error = bias + SD * np.sqrt(1.0 - stays) * random.standard_normal(4)
         place = PLACE - slides * (count - 1 - k) * STEP
-        seen = torques(q, "outer_link", (place, 0.0, 0.0), FORCE) + error
+        seen = torques(q, "outer_link", (place, 0.0, 0.0), force) + error
         now = Torques(k * STEP, seen, np.eye(4), staying, own, q)
         found.append(inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, now)[0])
     return found, inference.fusion
@@ -107,9 +104,16 @@ def test_errors_that_stay_are_not_taken_for_new_knowledge() -> None:
 
 
 def test_an_arm_that_does_not_move_shows_nothing_new() -> None:
-    found, fusion = played(np.random.default_rng(5), 0.5, moves=False)
+    found, fusion = played(np.random.default_rng(5), 0.5, moves=0.0)
     assert fusion.count == 1
     assert found[-1].position_sd == pytest.approx(found[0].position_sd, rel=0.5)
+
+
+def test_torques_that_grow_with_their_lever_are_not_taken_for_a_force_that_grows() -> None:
+    """A steady force along the tube: of a push of the inner link the lever would stay."""
+    random = np.random.default_rng(7)
+    ends = [played(random, 0.0, moves=2.0, is_along=True)[0][-1].cover for _ in range(12)]
+    assert ends.count("inner_link") < 4  # 11 if the force of each link grew by its torques
 
 
 @pytest.mark.parametrize(("change", "least", "most"), [(-1.0, 1, 1), (2.0, CONTACT.moments + 1, 9)])

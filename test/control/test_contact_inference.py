@@ -73,12 +73,7 @@ def test_any_direction_and_pose_on_the_outer_link() -> None:
     rng = np.random.default_rng(7)
     errors, forces, wrong = [], [], 0
     for _ in range(200):
-        q = (
-            rng.uniform(-3, 3),
-            rng.uniform(0.3, 2.2) * rng.choice((-1, 1)),
-            rng.uniform(-2.5, 2.5),
-            rng.uniform(-1.2, 2.4),
-        )
+        q = rng.uniform((-3.0, 0.3, -2.5, -1.2), (3.0, 2.2, 2.5, 2.4)) * (1, rng.choice((-1, 1)), 1, 1)
         x, phi, size = rng.uniform(0.05, L4), rng.uniform(-math.pi, math.pi), rng.uniform(3, 20)
         force = (0.0, size * math.cos(phi), size * math.sin(phi))
         found = EXACT.infer(q, torques(q, "outer_link", (x, 0, 0), force).tolist(), W)

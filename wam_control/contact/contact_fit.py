@@ -237,9 +237,8 @@ class ContactFit:
         radius off the axis.
         """
         link, (arm, turn) = _Link.of(gram, self._precision, 0.0), self._arms[i]
-        found = [link.force(place) for place in self._tried[i]]
-        largest = math.hypot(*max(found)[1])
-        _, (f1, f2) = max([(each + math.log(s[0] * s[2] - s[1] * s[1]), force) for each, force, s in found])
+        largest = math.hypot(*max(map(link.force, self._tried[i]))[1])
+        _, (f1, f2), _ = link.force(max(self._tried[i], key=link.log_density))
         size = math.hypot(f1, f2) + CONTACT.smallest_force
         twist, axial, turn1, turn2 = arm * size, self._given.friction * size, turn * f1, turn * f2
         u = [twist * g for g in gram[TWIST]]

@@ -8,10 +8,11 @@ motor that has moved on), and part stays (a wrong friction level, a shaft at res
 
 H the effects of the model's errors and P their covariance, which are the same in all moments; L the errors of shafts at
 rest or just reversed.  These may stay or change: they count as both, in L and in R.  One contact position explains all
-moments, by a force that grows and shrinks with the torques; how else it may change is in the covariance, too, by the
-links' probabilities: its direction by a fraction of its size, its position by the way that the arm has moved since,
-and by the speed of a contact that slides along its link.  Few slide: how probable that is follows from the same
-moments, by how much better a speed explains them, whatever the force and the position.
+moments, by a force on each link that grows and shrinks as the torques do, over those of the same force in each pose;
+how else it may change is in the covariance, too, by the links' probabilities: its direction by a fraction of its size,
+its position by the way that the arm has moved since, and by the speed of a contact that slides along its link.  Few
+slide: how probable that is follows from the same moments, by how much better a speed explains them, whatever the force
+and the position.
 How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
 `freedom` degrees of freedom of the statement itself.
 
@@ -63,7 +64,7 @@ class _Seen(NamedTuple):
 
 
 class _Past(NamedTuple):
-    """What past moments contribute; their forces in units of that of the last one.
+    """What past moments contribute; their forces in units of `forces`, each of its link.
 
     `gram` (links, 7, 7) of them alone; `predicts` (links, k, 7) and `explains` (k, k): C_np C_pp^-1 Z_p and
     C_np C_pp^-1 C_pn without the effects of the present moment at their outer sides.
@@ -74,6 +75,8 @@ class _Past(NamedTuple):
     explains: Array
     expected: float  # chi^2 of the errors alone, without what the force may have changed
     last: Torques  # of the last moment
+    places: Array  # (links,), m
+    forces: Array  # (links, 3), N, across and along, there, by the torques of the last moment
     slope: Array  # (links, n), N m per m of its contact position, by the square roots of the links' probabilities
     moments: int
 
@@ -117,16 +120,19 @@ class ContactFusion:
             return None
         effects = now.effects
         covariance = effects.dot(now.covariance).dot(effects.T) + now.own
-        way = self._speed * (now.time - past.last.time)
-        grown = _grown(now.residual, past.last.residual, covariance, way * past.slope)
-        if not CONTACT.least_likeness < grown < CONTACT.most_growth:
+        slips = self._speed * (now.time - past.last.time) * past.slope
+        sides, _ = _sides(rows[:, :, None], past.places)
+        alike = (past.forces[:, :, None] * sides[:, :, 0]).sum(axis=1)
+        likeness, *growth = _grown(now.residual, np.vstack((past.last.residual, alike)), covariance, slips)
+        if not CONTACT.least_likeness < likeness < CONTACT.most_growth:
             self.reset()
             return None
-        scale = np.array([1.0, *[1.0 / grown] * 6])
-        rest = rows - (effects @ (past.predicts * scale)).transpose(0, 2, 1)
+        scale = np.ones(rows.shape[:2])
+        scale[:, 1:] /= np.clip(growth, CONTACT.least_likeness, CONTACT.most_growth)[:, None]
+        rest = rows - (effects @ (past.predicts * scale[:, None])).transpose(0, 2, 1)
         precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
         found: Array = (
-            past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)
+            past.gram * (scale[:, :, None] * scale[:, None]) + rest @ precision @ rest.transpose(0, 2, 1)
         ) / self._widening
         if (found - found.transpose(0, 2, 1)).max() > CONTACT.rounding:
             self.reset()
@@ -166,25 +172,25 @@ class ContactFusion:
         effects = np.concatenate([each.effects for each in past])
         shared = effects.dot(last.covariance)
         common = shared.dot(effects.T)
-        places, chances = guess[:, 0], np.sqrt(guess[:, 1])
-        found, count = len(places), len(past)
-        rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
-        for j, moment in enumerate(moments):
-            rows[:, :, j] = moment.rows
-        sides, slopes = _sides(rows[:found, :, -1:], places)
-        present = sides[:, :, 0]
+        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
+        # a payload has no place, and is not moved
+        guess = np.concatenate((guess, np.zeros((len(rows) - len(guess), 2))))
+        places, chances, count = guess[:, 0], np.sqrt(guess[:, 1]), len(past)
+        sides, slopes = _sides(rows, places)
+        present = sides[:, :, -1]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
-        forces = np.linalg.solve(levers, (present @ last.residual)[..., None])[..., 0]  # (links, 3), N
+        wanted = np.linalg.solve(levers, (present @ last.residual)[..., None])
+        forces: Array = np.asarray(wanted[..., 0], np.float64)  # (links, 3), N
         moved = CONTACT.slip * np.abs(np.array([each.pose for each in past]) - now.pose).max(axis=1)
         elapsed = np.array([now.time + CONTACT.moves_on - each.time for each in past])
-        slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
+        slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, -1]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
-        ways = (moved + self._speed * elapsed).tolist()
-        sizes = [
-            _grown(each.residual, last.residual, certain, way * slope) for each, way in zip(past, ways, strict=True)
-        ]
-        rows[:, 1:] *= np.array(sizes)[:, None]
-        sides, slopes = _sides(rows[:found], places)
+        # by how much the force of each link was larger than `forces`, whose torques would then have been `alike`
+        alike = (forces[:, :, None, None] * sides).sum(axis=1)
+        ways = moved + self._speed * elapsed
+        sizes = np.transpose([_grown(past[j].residual, alike[:, j], certain, ways[j] * slope) for j in range(count)])
+        rows[:, 1:] *= sizes[:, None, :, None]
+        sides *= sizes[:, None, :, None]
         for j, each in enumerate(past):
             common[n * j : n * j + n, n * j : n * j + n] += each.own
         covariance = common.copy()
@@ -209,7 +215,7 @@ class ContactFusion:
         )
         self._speed = _speed(slides)
         far = np.multiply.outer(chances, moved + self._speed * elapsed)
-        slips = (per_metre * far[:, :, None]).reshape(found, -1)
+        slips = (per_metre * far[:, :, None]).reshape(len(rows), -1)
         covariance += slips.T.dot(slips)
         rows = rows.reshape(len(rows), 7, count * n)
         precision = inverse(covariance)
@@ -220,6 +226,8 @@ class ContactFusion:
             explains=shared.T.dot(precision).dot(shared),
             expected=float((precision * common).sum()),
             last=last,
+            places=places,
+            forces=forces,
             slope=slope,
             moments=count,
         )
@@ -232,10 +240,17 @@ def _sides(rows: Array, places: Array) -> tuple[Array, Array]:
     return sides, slopes
 
 
-def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
-    """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
-    weighted = solution(covariance + slips.T.dot(slips), before)
-    return float(torques.dot(weighted)) / float(before.dot(weighted))
+def _grown(torques: Array, alike: Array, covariance: Array, slips: Array) -> Array:
+    """Forces over those of which torques are given, (links,), by torques, (n,); as likely twice as large as gone.
+
+    Parameters
+    ----------
+    alike : (links, n), N m.
+    slips : (k, n), N m, by which each may differ apart from that.
+    """
+    weighted = alike.dot(inverse(covariance + slips.T.dot(slips)))
+    found: Array = (weighted.dot(torques) + 1.0) / ((weighted * alike).sum(axis=1) + 1.0)
+    return found
 
 
 def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> float:

@@ -151,8 +151,7 @@ class ModelErrors:
         """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
         k, size = len(self.errors), len(effects[0])
-        covariance = np.zeros((size, size))
-        covariance.ravel()[:: size + 1] = 1.0  # the diagonal
+        covariance = np.eye(size)
         covariance[:k, :k] = self.covariance
         return effects, self.size * covariance, self.size * self._with_noise(seen.rest, seen)
 
