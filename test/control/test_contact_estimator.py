@@ -302,7 +302,6 @@ def test_bad_samples_are_counted_and_change_nothing() -> None:
     assert not estimator.observe(motor, None, DT)
     assert not estimator.observe(motor, State(good.position, [math.nan] * 4, good.effort), DT)
     assert not estimator.observe(motor, State(good.position[:2], good.velocity, good.effort), DT)
-    assert estimator.refused == 3
     assert estimator.estimate() == before
     assert estimator.observe(State([math.nan] * 4, ZERO, ZERO), good, DT)  # not looked at
 

@@ -112,7 +112,6 @@ class ContactEstimator:
         self._inference = ContactInference(arm, self._observer.body, parameters.inference)
         self._is_blind = False
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
-        self.refused = 0
         self._forget()
 
     def brake(self, on: bool) -> None:
@@ -156,16 +155,13 @@ class ContactEstimator:
         Returns
         -------
         bool
-            False if the sample is refused; `refused` counts these.
+            False if the sample is refused.
         """
         if self._is_blind:
             self.reset()
             return True
         state = sensors if self._parameters.use_joint_sensors else motor
-        is_taken = state is not None and self._observer.observe(state, dt)
-        if not is_taken:
-            self.refused += 1
-        return is_taken
+        return state is not None and self._observer.observe(state, dt)
 
     def estimate(self, is_pressing: bool = False) -> ContactEstimate:
         """Estimate the contact from the samples so far.

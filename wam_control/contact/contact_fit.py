@@ -262,10 +262,9 @@ class ContactFit:
         count = self._given.positions
         for refined in range(CONTACT.refinements + 1):
             width = (high - low) / count
-            x = [low + (k + 0.5) * width for k in range(count)]
-            values = [link.log_density(place) for place in x]
-            floor = max(values) - CONTACT.search_depth
-            likely = [(value, place) for value, place in zip(values, x) if value > floor]  # noqa: B905
+            found = [(link.log_density(x), x) for x in [low + (k + 0.5) * width for k in range(count)]]
+            floor = max(found)[0] - CONTACT.search_depth
+            likely = [each for each in found if each[0] > floor]
             if len(likely) >= CONTACT.few_positions or refined == CONTACT.refinements:
                 break
             low, high = max(likely[0][1] - width, start), min(likely[-1][1] + width, end)

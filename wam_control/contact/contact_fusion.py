@@ -122,13 +122,14 @@ class ContactFusion:
         covariance = effects.dot(now.covariance).dot(effects.T) + now.own
         slips = self._speed * (now.time - past.last.time) * past.slope
         sides, _ = _sides(rows[:, :, None], past.places)
-        alike = (past.forces[:, :, None] * sides[:, :, 0]).sum(axis=1)
-        likeness, *growth = _grown(now.residual, np.vstack((past.last.residual, alike)), covariance, slips)
-        if not CONTACT.least_likeness < likeness < CONTACT.most_growth:
+        alike = past.forces[:, None] @ sides[:, :, 0]
+        alike = np.concatenate((past.last.residual[None], alike[:, 0]))
+        growth = _grown(now.residual, alike, covariance, slips)
+        if not CONTACT.least_likeness < growth[0] < CONTACT.most_growth:
             self.reset()
             return None
         scale = np.ones(rows.shape[:2])
-        scale[:, 1:] /= np.clip(growth, CONTACT.least_likeness, CONTACT.most_growth)[:, None]
+        scale[:, 1:] /= growth[1:, None].clip(CONTACT.least_likeness, CONTACT.most_growth)
         rest = rows - (effects @ (past.predicts * scale[:, None])).transpose(0, 2, 1)
         precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
         found: Array = (

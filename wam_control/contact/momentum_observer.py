@@ -258,12 +258,6 @@ class MomentumObserver:
         return ""
 
 
-def _low_pass(before: list[float], present: list[float], keep: float) -> list[float]:
-    """Filtered values of which the share `keep` stays: in a list, they take half the time of an array."""
-    take = 1.0 - keep
-    return [keep * old + take * new for old, new in zip(before, present)]  # noqa: B905 - as above
-
-
 class _Sample(NamedTuple):
     """The last sample that was taken.
 
@@ -317,7 +311,11 @@ class _Filters:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
         keeps = [math.exp(-span / time) if self.count else 0.0 for time in self.times]
         if not self.count or span <= self.times[0]:
-            self._values = [_low_pass(old, present, keep) for old, keep in zip(self._values, keeps, strict=True)]
+            # in lists: they take half the time of arrays
+            self._values = [
+                [keep * before + (1.0 - keep) * now for before, now in zip(old, present)]  # noqa: B905
+                for old, keep in zip(self._values, keeps, strict=True)
+            ]
         if len(signals):
             shares = np.array(keeps)[:, None]
             self._signals = shares * self._signals + (1.0 - shares) * signals
