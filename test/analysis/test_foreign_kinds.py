@@ -23,12 +23,7 @@ DRY, VISCOUS = 1.5, 0.8
 RISE = 6.0 - 6.0 * np.exp(-np.maximum(np.arange(-2.0, 18.0, 0.004), 0.0) / 0.1)
 
 
-def sqlite(path: Path, sent: list[Sent]) -> Path:
-    return by_rosbags(path, sent, "sqlite3")
-
-
-def ros1(path: Path, sent: list[Sent]) -> Path:
-    return by_rosbags(path, sent, "ros1")
+sqlite, ros1 = (partial(by_rosbags, storage=one) for one in ("sqlite3", "ros1"))
 
 
 def json_directory(path: Path, sent: list[Sent]) -> Path:
@@ -407,7 +402,8 @@ def contradictions() -> list[Case]:
         *(scaled(by, ros1, 50.0) for by in (0.105, 1.05)),
     ]
     return [*scales, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0),
-            slipping(0.92, by_rosbags, 100.0)]  # fmt: skip
+            Case("slips now and then", by_rosbags, one("/js", 100.0, 0.3, 0.7, lambda q: q - 0.15 * np.clip(
+                np.arange(len(q)) / 20.0 - [[31], [66], [109]], 0.0, 1.0).sum(0)), {}, "an encoder slips")]  # fmt: skip
 
 
 def formats() -> list[Case]:

@@ -10,7 +10,7 @@ from wam_analysis.findings.stick_slip import rest_speed
 from wam_analysis.foreign.sources import Piece, Source, pieces, rests, ways
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import CYCLE, SHAFT
+from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.columns import JOINT_FIELDS
 
@@ -120,19 +120,23 @@ def contradiction(source: Source) -> str:
 def _lost_way(piece: Piece, unit: str) -> str:
     """Where the position moves least as the velocity has it, and by how much each; '' where they agree.
 
-    A velocity of another scale, or one that is late, differs alike all the time.
+    A velocity that is late differs only as far as it changes meanwhile; one of another scale, or of the other side of a
+    play, differs alike all the time, and by less than an encoder that slips now and then.
     """
     time, velocity, period = piece.time, piece.values["velocity"], piece.period
     width = max(1, round(SHAFT.way / period))
     if len(time) <= width:
         return ""
     moved, by = ways(piece, width)
-    speeds = np.abs(velocity)
-    far, change = np.convolve(speeds[1:], np.full(width, period), "valid"), velocity[width:] - velocity[:-width]
+    far = np.convolve(np.abs(velocity[1:]), np.full(width, period), "valid")
+    change = velocity[width:] - velocity[:-width]
     columns = np.column_stack([by, change])
-    off = np.abs(moved - columns @ np.linalg.lstsq(columns, moved, rcond=None)[0])
-    allowed = SHAFT.late * far + period * np.abs(change) + SHAFT.joint_rest * SHAFT.way
-    excess = off - allowed - SHAFT.noisy * piece.noise["position"]
+    left = np.abs(moved - columns @ np.linalg.lstsq(columns, moved, rcond=None)[0])
+    usual = STREAM.zero * np.median(left[far >= np.median(far)])
+    excess = np.maximum(np.abs(moved - by) - SHAFT.agree * far, left - np.maximum(SHAFT.late * far, usual))
+    noise = piece.noise["position"] + piece.noise["velocity"] * period * math.sqrt(width)
+    allowed = SHAFT.joint_rest * SHAFT.way + max(SHAFT.longest_effort_lag, period) * np.abs(change)
+    excess -= allowed + SHAFT.noisy * noise
     if 2 * np.sum(excess > 0.0) < width:
         return ""
     worst = int(np.argmax(excess))
