@@ -31,11 +31,7 @@ def joint_bounds(
 
     ends = zip(joints.lower, q, joints.upper, before, strict=True)
     each = [(-towards(at - lower), towards(upper - at), last) for lower, at, upper, last in ends]
-    return [_within(v - step, a, b) for a, b, v in each], [_within(v + step, a, b) for a, b, v in each]
-
-
-def _within(value: float, low: float, high: float) -> float:
-    return low if value < low else min(value, high)
+    return [min(max(v - step, a), b) for a, b, v in each], [min(max(v + step, a), b) for a, b, v in each]
 
 
 def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
