@@ -300,7 +300,7 @@ class _Filters:
     def __init__(self, n: int, signals: int, times: Sequence[float], cycle: int) -> None:
         self.times, self.cycle, self._n = times, cycle, n
         self._ring = np.zeros((cycle, 5 * n + signals))
-        self._empty = [[0.0] * (5 * n) for _ in times], np.zeros((len(times), signals))
+        self._empty = [[0.0] * (5 * n) for _ in times], [np.zeros(signals) for _ in times]
         self.reset()
 
     def reset(self) -> None:
@@ -317,8 +317,8 @@ class _Filters:
                 for old, keep in zip(self._values, keeps, strict=True)
             ]
         if len(signals):
-            shares = np.array(keeps)[:, None]
-            self._signals = shares * self._signals + (1.0 - shares) * signals
+            each = zip(self._signals, keeps, strict=True)
+            self._signals = [keep * old + (1.0 - keep) * signals for old, keep in each]
         if self.cycle:
             self._ring[self.count % self.cycle] = np.concatenate((self._values[0], self._signals[0]))
         self.count += 1

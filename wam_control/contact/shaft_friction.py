@@ -75,7 +75,7 @@ class ShaftFriction:
             self._stribeck = np.array([*model.motors.stribeck_velocity, *model.joints.stribeck_velocity])
         is_identified = model is not None and model.is_identified
         self._slow = self._stribeck * CONTACT.slow * (1.0 if is_identified else CONTACT.assumed_stribeck)
-        self._rise = is_identified * (self.static - self.dynamic)
+        self._rise = self.static - self.dynamic if is_identified else None
         self._per_distance = np.outer(1.0 / self._rest_velocity, np.exp(-LOG_DISTANCES))
         self._rest = self._rest_velocity
         # numpy takes arrays of one shape several times faster than it broadcasts them
@@ -99,15 +99,18 @@ class ShaftFriction:
         speed, each = np.abs(velocity), self._each
         moving = np.minimum(1.0, speed / self._rest)
         remembered = (1.0 - (1.0 - keep) * (1.0 - moving))[each]
-        left = np.exp((-dt * speed)[each] * self._per_distance)
         way = np.sign(velocity)[each]
-        if not keep:  # a dither swings a shaft beyond any presliding
-            left, way = np.zeros_like(left), moving[each] * way
+        if keep:
+            left = np.exp((-dt * speed)[each] * self._per_distance)
+        else:  # a dither swings a shaft beyond any presliding
+            left, way = np.zeros_like(way), moving[each] * way
         self._sliding = way + (remembered * self._sliding - way) * left
         self._resting = np.maximum(left * self._resting, (1.0 - moving * moving)[each])
         sliding = self._sliding.dot(EQUAL)
-        turned = velocity / self._stribeck
-        level = self.dynamic + self._rise * np.exp(-turned * turned)
+        level = self.dynamic
+        if self._rise is not None:
+            turned = velocity / self._stribeck
+            level = level + self._rise * np.exp(-turned * turned)
         return ShaftMotion(
             level * sliding + self._viscous * velocity,
             self._sliding,
