@@ -8,7 +8,7 @@ import numpy as np
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import certain_size, largest_lever, likeliest_link
+from wam_control.force.limits import certain_size, largest_lever, lever_of, likeliest_link
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
@@ -110,16 +110,17 @@ class PushedArm:
     ) -> list[float]:
         """Largest torque per force, m: at the one known force, at the estimated contact, or wherever else it may push.
 
-        Without a position, that is at the tool, and at the far end of a link that is known.
+        Without a position, that is at the tool, and at the end of a known link where it takes the least force.
         """
         body, places = self._body, {axis.place[:2] for axis in axes if axis.place and axis.place.is_known}
         cover, position = places.pop() if len(places) == 1 else contact[:2]
-        jacobians = []
-        if math.isnan(position):
-            jacobians.append(body.tool_jacobian(q))
-            position = body.arm.covers.length_of(cover) if cover else position
-        if cover:
-            jacobians.append(body.point_jacobian(q, cover, (position, 0.0, 0.0)))
+        if not math.isnan(position):
+            levers = [largest_lever(body.point_jacobian(q, cover, (position, 0.0, 0.0)))]
+        else:
+            levers = [largest_lever(body.tool_jacobian(q))]
+            if cover:
+                ends = (body.point_jacobian(q, cover, (x, 0.0, 0.0)) for x in (0.0, body.arm.covers.length_of(cover)))
+                levers.append(max(lever_of(jacobian, torques) for jacobian in ends))
         if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
-            jacobians.append(likeliest_link(body, q, torques))
-        return [largest_lever(jacobian) for jacobian in jacobians]
+            levers.append(largest_lever(likeliest_link(body, q, torques)))
+        return levers

@@ -112,6 +112,12 @@ def largest_lever(jacobian: Array) -> float:
     return max(math.sqrt(largest_eigenvalue(jacobian.dot(jacobian.T))), FORCE.least_lever)
 
 
+def lever_of(jacobian: Array, torques: Array) -> float:
+    """Torques (n,), N m, per least force at a point with this Jacobian (3, n) that explains them best, m."""
+    explained = float(torques @ jacobian.T @ np.linalg.lstsq(jacobian.T, torques, rcond=None)[0])
+    return length(jacobian.dot(torques)) * length(torques) / max(explained, FORCE.negligible)
+
+
 def likeliest_link(body: RigidBody, q: Angles, torques: Array) -> Array:
     """Jacobian (3, n) of the far end of the link of which one force explains torques (n,), N m, best.
 
