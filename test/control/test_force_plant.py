@@ -17,12 +17,13 @@ from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.outcome import TaskEnd
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import RANGES, Task, triple
+from wam_studies.force_benchmark.tasks import RANGES, Task, configured, steps, triple
 from wam_studies.force_benchmark.trial import perform
 
 OUTER = "outer_link"
 FAR_AWAY = {"driver:world.obstacles.positions": [3.0, 3.0, 3.0]}
 POSE = (0.3, -1.2, 0.2, 1.0)
+AGAINST = triple(-BODY.cover_pose(POSE, OUTER).rotation[:, 1])
 MOTORS = {
     "arm.joint_sensors": False,
     "contact_estimator:use_joint_sensors": False,
@@ -80,10 +81,18 @@ def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
 
 
 @pytest.mark.slow
+def test_on_a_soft_surface_that_is_declared_a_force_follows_its_command() -> None:
+    """0.1 s after a step from 5 to 10 N; the law alone had come to 7.7 N."""
+    task = Task(POSE, Surface(OUTER, 0.28, AGAINST, 400.0, 0.3, is_plane=False), 10.0, before=5.0)
+    run = Simulation(configured(CONFIGURATION, task), steps(task, 0.1))
+    assert run.play() == ""
+    assert math.hypot(*run.driver.true_contact.force) == pytest.approx(10.0, abs=0.6)
+
+
+@pytest.mark.slow
 def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
     """0.2 A: the integral of the velocity loop was lost where the current was 0, and 6.6 N stayed of 5."""
-    x, y, z = (-BODY.cover_pose(POSE, OUTER).rotation[:, 1]).tolist()
-    task = Task(POSE, Surface(OUTER, 0.28, (x, y, z), 4000.0, 0.3, is_plane=False), 5.0)
+    task = Task(POSE, Surface(OUTER, 0.28, AGAINST, 4000.0, 0.3, is_plane=False), 5.0)
     result = perform(CONFIGURATION, task, 2.5, {"driver:amplifier.deadband": [0.2] * 4})
     assert result.outcome is TaskEnd.DONE
     assert result.mean == pytest.approx(5.0, rel=0.06)
@@ -111,15 +120,11 @@ def test_a_payload_that_a_scenario_tares_is_no_part_of_a_force_in_another_pose()
 @pytest.mark.slow
 def test_the_guard_counts_a_payload() -> None:
     """Its margin is that of the loaded arm."""
-    own = CONFIGURATION.node("force_loop", ForceLoopParameters)
-    scales = []
+    own, shared, scales = CONFIGURATION.node("force_loop", ForceLoopParameters), CONFIGURATION.shared, []
     for mass in (0.0, 0.5):
         loaded = replace(WAM, payload=mass)
-        guard = StabilityGuard(
-            loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, own.sensing_fed_back
-        )
-        contacts = guard.contacts(own.guard.posture, OUTER, 0.28, 0.0)
-        scales.append(min(guard.scales(task_of(own), contacts)))
+        guard = StabilityGuard(loaded, shared.servo, shared.timing, own.guard, own.sensing_fed_back)
+        scales.append(min(guard.scales(task_of(own), guard.contacts(own.guard.posture, OUTER, 0.28, 0.0))))
     assert abs(scales[1] / scales[0] - 1.0) > 0.1
 
 

@@ -58,7 +58,7 @@ def pushed(
 
 
 @pytest.mark.parametrize(
-    ("cover", "place", "pinned", "most", "before"), [(OUTER, 0.35, False, 20.0, 30.0), (INNER, 0.35, True, 40.0, 40.0)]
+    ("cover", "place", "pinned", "most", "before"), [(OUTER, 0.35, False, 20.0, 25.0), (INNER, 0.35, True, 40.0, 40.0)]
 )
 def test_a_rod_that_comes_from_the_side_to_an_arm_that_presses_is_given_way_to(
     cover: str, place: float, pinned: bool, most: float, before: float

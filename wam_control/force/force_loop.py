@@ -35,6 +35,7 @@ from wam_control.force.limits import (
     joint_bounds,
     resolution,
     servo_yielding,
+    yielding,
 )
 from wam_control.force.problem import VelocityRow, solve, unlimited
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
@@ -376,6 +377,7 @@ class ForceLoop:
         if axis.sensed is None:
             error, before = axis.desired - known.force, axis.desired - known.before
             return factor * self.supervision.torque_law.velocity(axis.of.joint, error, before, dt)
+        before = one.rising
         law, expected = self.supervision.force_law.along(axis.in_frame.tolist()), one.expected(own, dt)
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
@@ -384,6 +386,8 @@ class ForceLoop:
                 return 0.0
         error = expected - known.force
         speed = factor * one.watch.oscillation.share * law.velocity(0, error, expected - known.before, dt)
+        if one.touch.is_there and own.limits.impact:
+            speed += (one.rising - before) / dt * yielding(axis.sensed, own)
         if axis.desired:  # back no faster than the measured force can follow
             slack = servo_yielding(axis, self.supervision.servo_stiffness, own)
             most = approach_speed(axis, one.touch.is_there, own, slack)
