@@ -128,8 +128,8 @@ def _lost_way(piece: Piece, unit: str) -> str:
     if len(time) <= width:
         return ""
     moved, by = ways(piece, width)
-    far = np.convolve(np.abs(velocity[1:]), np.full(width, period), "valid")
-    change = velocity[width:] - velocity[:-width]
+    path = period * np.concatenate(([0.0], np.cumsum(np.abs(velocity[1:]))))
+    far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
     columns = np.column_stack([by, change])
     left = np.abs(moved - columns @ np.linalg.lstsq(columns, moved, rcond=None)[0])
     usual = STREAM.zero * np.median(left[far >= np.median(far)])

@@ -364,15 +364,22 @@ def _treated(one: Source) -> Source:
         if wraps:
             values["position"] = position
             treated.append(Treated(Treatment.WRAPPED, "position", wraps, size=turn))
-    for quantity, value in values.items():
-        if not one.is_command and len(rows := _spikes(one._replace(values=values), quantity)):
+    measured = {} if one.is_command else values
+    shown = one._replace(values=values).only("position", "velocity")
+    moves = _jumps(shown) if "position" in measured else np.zeros(len(shown.time))
+    back = shown.time[:-1][moves[:-1] * moves[1:] < 0.0]
+    for quantity, value in measured.items():
+        # a zero that would move and move back is a single sample, too
+        rows = row_at(one.time, back) if quantity == "position" and len(back) else _spikes(value)
+        if len(rows):
             mean, values[quantity] = 0.5 * (value[rows - 1] + value[rows + 1]), value.copy()
             values[quantity][rows] = mean
             size = np.max(np.abs(value[rows] - mean))
             treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
-    if "position" in values and not one.is_command:
-        shown = one._replace(values=values).only("position", "velocity")
-        moves = _jumps(shown)
+    if "position" in measured:
+        if any(each.what is Treatment.SPIKES for each in treated):
+            shown = one._replace(values=values).only("position", "velocity")
+            moves = _jumps(shown)
         if len(sizes := moves[moves != 0.0]):
             values["position"] = values["position"] - np.cumsum(moves)[row_at(shown.time, one.time)]
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
@@ -384,17 +391,9 @@ def _treated(one: Source) -> Source:
     return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
 
 
-def _spikes(one: Source, quantity: str) -> Index:
-    """Rows of single samples away from both neighbours, by more than all others extend over.
-
-    Those of a position, too, to and from which its zero would move.
-    """
-    if quantity == "position":
-        shown = one.only("position", "velocity")
-        moves = _jumps(shown)
-        if len(rows := np.flatnonzero(moves[:-1] * moves[1:] < 0.0)):
-            return np.asarray(row_at(one.time, shown.time[rows]), np.int64)
-    value = np.where(np.isfinite(one.values[quantity]), one.values[quantity], math.nan)
+def _spikes(value: Numbers) -> Index:
+    """Rows of single samples away from both neighbours, by more than all others extend over."""
+    value = np.where(np.isfinite(value), value, math.nan)
     steps = np.diff(value)
     away = np.where(steps[1:] * steps[:-1] < 0.0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
     if len(away) < SHAFT.fewest_samples:
