@@ -377,7 +377,7 @@ class ForceLoop:
         if axis.sensed is None:
             error, before = axis.desired - known.force, axis.desired - known.before
             return factor * self.supervision.torque_law.velocity(axis.of.joint, error, before, dt)
-        before = one.rising
+        risen = one.rising
         law, expected = self.supervision.force_law.along(axis.in_frame.tolist()), one.expected(own, dt)
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
@@ -387,7 +387,7 @@ class ForceLoop:
         error = expected - known.force
         speed = factor * one.watch.oscillation.share * law.velocity(0, error, expected - known.before, dt)
         if one.touch.is_there and own.limits.impact:
-            speed += (one.rising - before) / dt * yielding(axis.sensed, own)
+            speed += (one.rising - risen) / dt * yielding(axis.sensed, own)
         if axis.desired:  # back no faster than the measured force can follow
             slack = servo_yielding(axis, self.supervision.servo_stiffness, own)
             most = approach_speed(axis, one.touch.is_there, own, slack)
