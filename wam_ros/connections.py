@@ -159,8 +159,8 @@ class StackNode(TolerantNode):
             self.report_ready()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """As that of rclpy; a value that is not allowed is named, with those that are."""
-        if reason := refusal(self.own, parameter_list):
+        """As that of rclpy; what is not allowed is named, with what is."""
+        if reason := refusal(self, self.own, parameter_list):
             return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(parameter_list)
 

@@ -7,9 +7,10 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED
-from wam_description.parameters import Field, ParameterError, build, checked, fields, listed, values
+from wam_description.parameters import Field, ParameterError, build, checked, fields, listed, meant, values
 from wam_description.wiring import raised
 
 T = TypeVar("T")
@@ -62,18 +63,24 @@ def descriptor(field: Field) -> ParameterDescriptor:
     return result
 
 
-def refusal(own: Any, parameters: Iterable[Parameter]) -> str:
-    """Why a value of a live parameter cannot be taken, whatever the others are; '' where all can.
+def refusal(node: Node, own: Any, parameters: Iterable[Parameter]) -> str:
+    """Why a parameter cannot be set while the node runs, whatever the others are; '' where all can.
 
-    rclpy would report it as out of range, without the value or the range.
+    rclpy would name neither its value nor what is allowed.
     """
-    given = {parameter.name: _plain(parameter) for parameter in parameters}
-    try:
-        for field in fields(type(own)):
-            if field.live and field.name in given:
-                checked(field, given[field.name])
-    except ParameterError as error:
-        return str(error)
+    live = {field.name: field for field in fields(type(own)) if field.live}
+    for parameter in parameters:
+        name = parameter.name
+        if name in live:
+            try:
+                checked(live[name], _plain(parameter))
+            except ParameterError as error:
+                return str(error)
+        elif name not in OWN_NAMES:
+            shown = f"parameter '{printable(name, 100)}'"
+            reason = f"{shown} is chosen at the start" if node.has_parameter(name) else f"unknown {shown}"
+            allowed = f"while node {node.get_name()} runs, these may change: {', '.join(sorted(live)) or 'none'}"
+            return f"{reason}; {meant(name, live)}{allowed}"
     return ""
 
 

@@ -13,7 +13,6 @@ from rclpy.parameter import Parameter
 
 from wam_bag.printable import printable
 from wam_description.defects import UnusableOutput
-from wam_description.parameters import meant
 from wam_description.wiring import raised
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.process_signals import leaving
@@ -107,21 +106,6 @@ class TolerantNode(LeavingNode):
         if hasattr(response, "message"):
             response.success, response.message = False, self._exception_fault
         return response
-
-    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """As that of rclpy, whose reason for a name that cannot be set lists nothing."""
-        for name in (found.name for found in parameter_list):
-            shown = printable(name, 100)
-            if not self.has_parameter(name):
-                return self._refusal(name, f"unknown parameter '{shown}'")
-            if self.describe_parameter(name).read_only:
-                return self._refusal(name, f"parameter '{shown}' is chosen at the start")
-        return super().set_parameters_atomically(parameter_list)
-
-    def _refusal(self, name: str, reason: str) -> SetParametersResult:
-        live = [one for one in sorted(self.list_parameters([], 0).names) if not self.describe_parameter(one).read_only]
-        allowed = f"while node {self.get_name()} runs, these may change: {', '.join(live) or 'none'}"
-        return SetParametersResult(successful=False, reason=f"{reason}; {meant(name, live)}{allowed}")
 
     def _take_exception(self, what: str, error: Exception) -> None:
         self._exception_time = time.monotonic()
