@@ -14,13 +14,8 @@ from wam_description.status import REFUSED
 REASONS: Final = {
     Reason.MOMENT_ONLY: "on this link only the moment is measured: the contact position is unknown, and the estimated "
     "force is a lower bound",
-    Reason.BENT: "elbow at 90 deg and force in the plane of the arm: contact position and force cannot be separated",
-    Reason.STRAIGHT: "elbow straight and force across the plane of the arm: contact position and force cannot be "
-    "separated",
-    Reason.SHOULDER: "in this pose, one moment at the shoulder is not measured",
+    Reason.POSE: "in this pose, the torques of a force in this direction do not determine the contact position",
     Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
-    Reason.ELBOW: "torque of the elbow near 0: contacts near it and on the link before it cannot be distinguished",
-    Reason.STRAIGHT_LINK: "elbow straight and force across the plane of the arm: the links cannot be distinguished",
     Reason.LINKS: "the link is not certain: a contact on another one explains the torques almost as well",
     Reason.MORE: "no single contact explains the torques",
     Reason.ALONG: "a force along this link, or along the link before it, explains the torques equally well",

@@ -6,7 +6,6 @@ moment only.
 """
 
 import math
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,9 +25,6 @@ from wam_description.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
-
-# how close to an ambiguous pose or direction that is given as the reason, and to one at right angles
-NEAR, FAR = math.cos(math.radians(20.0)), math.sin(math.radians(20.0))
 
 
 class Hypothesis(NamedTuple):
@@ -80,7 +76,6 @@ class _Cover(NamedTuple):
     end: list[float]
     wrenches: Array  # (6, 6), rows A_1, A_2, B_1, B_2, twist, axial: force and moment in the cover's frame
     across: list[list[float]]  # (3, 2), directions across the tube, near the cover's y and z
-    joints: int  # number of joints that move the cover
     is_moment_only: bool
 
 
@@ -92,12 +87,10 @@ def detection_statistic(torques: Array, precision: Array) -> float:
 class ContactInference:
     """Gives one hypothesis per cover, from the probabilities of contact positions along it.
 
-    Any joints, links and covers will do.  Where joints meet in a shoulder, with a cover from there to the next joint,
-    the elbow, and a cover from that on, reasons name poses of these two.
+    Any joints, links and covers will do.
 
     Attributes
     ----------
-    jacobians : (covers, 6, n), of the covers in the last pose, once there is one.
     fusion : earlier moments of the present contact.
     """
 
@@ -107,15 +100,6 @@ class ContactInference:
         aligned("inference", arm.covers.names, parameters)
         start, end = ([at[0] for at in ends] for ends in zip(*((c.start, c.end) for c in covers), strict=True))
         self._fit = ContactFit(start, end, arm.covers.radius, parameters)
-        # of the one joint between a cover of which a moment alone is measured and one that is located
-        self._elbow = next(
-            (
-                i
-                for i, (inner, outer) in enumerate(pairwise(covers), start=1)
-                if inner.is_moment_only and not outer.is_moment_only and inner.joints == outer.joints - 1
-            ),
-            None,
-        )
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.fusion = ContactFusion(parameters.fusion_time)
 
@@ -147,10 +131,10 @@ class ContactInference:
         given, links = self._parameters, len(self._covers)
         if sum(precision.diagonal().tolist()) > CONTACT.smallest_sd**-2:
             precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(precision)))
-        self.jacobians = np.array([self._body.cover_jacobian(q, cover.name) for cover in self._covers])
+        jacobians = np.array([self._body.cover_jacobian(q, cover.name) for cover in self._covers])
         rows = np.zeros((links + 1, 7, len(precision)))  # the last are those of a payload
         rows[:, 0] = torques
-        np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
+        np.matmul(self._wrenches, jacobians, out=rows[:links, 1:])
         if load is not None:
             rows[links, 1] = load
         gram = None if now is None else self.fusion.gram(rows, now)
@@ -169,22 +153,25 @@ class ContactInference:
             self.fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
         reasons, doubtful = NO_REASON, 0.5
         if best.probability < given.identification_threshold:
-            reasons, doubtful = self._why_ambiguous(q, set(order[:2]), fits), CONTACT.noted_probability
+            reasons, doubtful = Reason.LINKS, CONTACT.noted_probability
         if 1.0 - sum([fit.probability for fit in fits]) > CONTACT.noted_probability:
             reasons |= Reason.PAYLOAD
         found = []
         for i in order:
             own = reasons | Reason.ALONG if fits[i].along > doubtful else reasons
-            found.append(self._hypothesis(q, i, fits[i], own, moments, late))
+            found.append(self._hypothesis(i, fits[i], own, moments, late))
         return tuple(found)
 
-    def _hypothesis(self, q: ArrayLike, i: int, fit: Fit, reasons: Reason, moments: int, late: float) -> Hypothesis:
+    def _hypothesis(self, i: int, fit: Fit, reasons: Reason, moments: int, late: float) -> Hypothesis:
         cover = self._covers[i]
         start, end = cover.start[0], cover.end[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > end - start
         residual = fit.residual / moments
-        if is_unknown:
-            reasons |= self._why_unknown(q, i, fit)
+        if cover.is_moment_only:
+            reasons |= Reason.MOMENT_ONLY
+        elif is_unknown:
+            sd_of_usual = fit.torque_position_sd * math.hypot(*fit.force) / self._parameters.force_scale
+            reasons |= Reason.POSE if sd_of_usual > end - start else Reason.WEAK
         if residual > self._parameters.largest_residual:
             reasons |= Reason.MORE
         place = end if is_unknown else fit.position
@@ -210,45 +197,6 @@ class ContactInference:
             reasons=reasons,
         )
 
-    def _why_unknown(self, q: ArrayLike, i: int, fit: Fit) -> Reason:
-        """Why the position on a cover is unknown."""
-        if self._covers[i].is_moment_only:
-            return Reason.MOMENT_ONLY
-        if i == self._elbow:
-            in_plane, straight, bent = self._at_elbow(q, i, fit)
-            if in_plane > NEAR and bent > NEAR:
-                return Reason.BENT
-            if in_plane < FAR and straight > NEAR:
-                return Reason.STRAIGHT
-            axes = self.jacobians[i - 1][3:, : self._covers[i - 1].joints]
-            # of three axes 1 - cos of the angle of two, as theta2
-            if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:
-                return Reason.SHOULDER
-        return Reason.WEAK
-
-    def _why_ambiguous(self, q: ArrayLike, likeliest: set[int], fits: list[Fit]) -> Reason:
-        """Why the link is not identified."""
-        i = self._elbow
-        if i is not None and likeliest == {i - 1, i}:
-            fit = fits[i]
-            in_plane, straight, _ = self._at_elbow(q, i, fit)
-            if straight > NEAR and in_plane < FAR:
-                return Reason.STRAIGHT_LINK
-            if fit.position - self._covers[i].start[0] < 2.0 * fit.position_sd:
-                return Reason.ELBOW
-        return Reason.LINKS
-
-    def _at_elbow(self, q: ArrayLike, i: int, fit: Fit) -> tuple[float, float, float]:
-        """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""
-        cover = self._covers[i]
-        inner, outer = (self._body.cover_pose(q, self._covers[j].name).rotation for j in (i - 1, i))
-        cosine = min(1.0, abs(float(inner[:, 0] @ outer[:, 0])))
-        force = np.array(cover.across) @ fit.force
-        hinge = self.jacobians[i][3:, cover.joints - 1]
-        size = float(np.linalg.norm(force))
-        out_of_plane = abs(float(force @ hinge)) / size if size > 0.0 else 1.0
-        return math.sqrt(max(0.0, 1.0 - out_of_plane**2)), cosine, math.sqrt(1.0 - cosine**2)
-
 
 def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:
     name, start, end = cover.name, np.array(cover.start), np.array(cover.end)
@@ -272,6 +220,5 @@ def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:
         end=end.tolist(),
         wrenches=np.hstack((forces, moments)),
         across=across.T.tolist(),
-        joints=arm.links.names.index(cover.link) + 1,
         is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
     )
