@@ -204,8 +204,8 @@ def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[StepS
     return f"not assessed: its force, torque or motion was commanded for at most {limit}"
 
 
-def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:
-    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how long and why.
+def in_words(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[tuple[str, str]]:
+    """Each kind of reaction to a command of this name: when, from `zero` on, ns, and how long; and why.
 
     Time and reason are those of the longest.
     """
@@ -218,7 +218,7 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
         verb += f" ({kind.words})" * (kind is not Code.REFUSED)
         again = f", and for {others:.2f} s at other times" * (len(alike) > 1)
         begin, end = ((stamp - zero) / 1e9 for stamp in (longest.begin, longest.end))
-        lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {longest.reason}")
+        lines.append((f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}", longest.reason))
     return lines
 
 

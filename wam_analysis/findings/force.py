@@ -2,49 +2,43 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
-from wam_analysis.findings.finding import Finding, Section, shown, stated
+from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.held_messages import step_at
+from wam_analysis.measures.response import StepResponse
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
 from wam_control.force.guard import margin_text
 from wam_control.force.thresholds import GUARD
-from wam_description.event import Code
 from wam_description.number_text import apart
 from wam_description.signals import BASE
-from wam_sim.reactions import IN_DOUBT, STEADY, RecordedReaction, duration, of_force_loop, within
-from wam_sim.reactions import sentences as reaction_sentences
+from wam_sim.reactions import STEADY, RecordedReaction, duration, in_words, of_force_loop, within
 from wam_theory.verdicts import Verdict
 
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
 WHOSE = "Each force is the part along the command. The force loop measures; the contact estimator estimates."
-NOT_APPLIED, ELSE = "The arm held its position instead", "Reported by the force loop"
 STICTION = (
     "(5.8), (5.9) corrected, with the velocity loops in series with the cables; measured over three cycles or more"
 )
+SWINGS_ON = (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
 NO_FORCE = f"No commanded force was constant for {HOLD.shortest:g} s or longer"
 
 
 def force_section(recording: AnalysedRecording) -> Section:
     """Each commanded force, how it was reached and held, and the dynamic range (3.2.1)."""
     lacking = recording.run.lacking("force_command", "force_measured", "sim/contact/wrench")
-    sentences, findings, zero, held = [], [], recording.traces.zero, recording.held
-    for one in held:
-        sentences.append(_press_sentence(one))
-        sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions, zero)]
-        findings += press_findings(one)
-    if not held:
-        sentences.append(f"{NO_FORCE}.")
-    other = _other_reactions(recording)
-    sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
-    reactions = [*((one.hold.name, one.hold.reactions) for one in held), *other.items()]
+    held = recording.held
+    reactions = [*((one.hold.name, one.hold.reactions) for one in held), *_other_reactions(recording).items()]
+    reported = [pair for name, found in reactions for pair in in_words(name, found, recording.traces.zero)]
+    sentences = [*map(_press_sentence, held), *([] if held else [f"{NO_FORCE}."])]
+    sentences += [f"{what}: {why}." for what, why in reported]
     sentences += [WHOSE] * any(not one.hold.is_refused for one in held)
-    findings += _dynamic_range(recording)
-    wrong = _reaction_verdict(reactions, zero)
+    findings = [finding for one in held for finding in press_findings(one)] + _dynamic_range(recording)
+    wrong = [f"{what}." for what, _ in reported]
     return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong)
 
 
@@ -58,27 +52,6 @@ def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedRe
     for one in rest * (not recording.steps):
         steps[step_at(holds, one.begin) or "force loop"] += (one,)
     return {name: found for name, found in steps.items() if found}
-
-
-def _reaction_verdict(found: Iterable[tuple[str, Sequence[RecordedReaction]]], zero: int) -> list[str]:
-    """What was refused, and what was reported of others, in a sentence each."""
-    doubtful = stated(IN_DOUBT)[:-1]
-    alike = {
-        what: defaultdict[tuple[str, Code], list[RecordedReaction]](list) for what in (NOT_APPLIED, doubtful, ELSE)
-    }
-    for name, reactions in found:
-        for one in reactions:
-            what = NOT_APPLIED if one.holds else doubtful if one.name is Code.REFUSED else ELSE
-            alike[what][name, one.name].append(one)
-    lines = []
-    for what, named in alike.items():
-        each = []
-        for (name, code), ones in named.items():
-            event = "from" if what is doubtful else f"{code.words} at"
-            lasting = f", for {duration(ones):.2f} s{' in all' * (len(ones) > 1)}" * (what is NOT_APPLIED)
-            each.append(f"{name} ({event} {(ones[0].begin - zero) / 1e9:.2f} s{lasting})")
-        lines += [f"{what}: {'; '.join(each)}."] * bool(each)
-    return lines
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
@@ -103,8 +76,8 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     known = [one for one in recording.held if math.isfinite(one.best.smallest)]
     if not known:
         return []
-    limits = [one.largest for one in recording.theories.values() if one.largest and math.isfinite(one.largest.force)]
-    limit = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
+    limits = [one.largest for one in recording.theories.values() if math.isfinite(one.largest.force)]
+    limit = min(limits, key=lambda limit: limit.force, default=LargestForce())
     smallest = max(one.best.smallest for one in known) or math.nan
     largest = max(0.0, *(one.hold.commanded + one.best.bias for one in known))
     by = f"limited by {limit.limited_by}" if limits else ""
@@ -130,7 +103,7 @@ def _press_sentence(one: HeldForce) -> str:
     if math.isnan(one.best.bias):
         return f"{text}; the resulting force was not recorded."
     remarks = [text]
-    if response is not None and math.isfinite(response.rise):
+    if response is not None:
         if why := _impact(one):
             remarks.append(f"{why}, so rise time and overshoot are not evaluated")
         remarks += ["it did not stay within 5 % of the step"] * math.isinf(response.settling)
@@ -166,16 +139,17 @@ def press_findings(one: HeldForce) -> list[Finding]:
             Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
         ]
     if response is not None:
-        rose, late, over = response.rise, response.rise_error, 100.0 * response.overshoot
-        if _impact(one):
-            rose = late = over = math.nan
-        since = "from the touch-down" if one.touched > 0.0 else ""
-        found += [
-            Finding(f"{name}: rise time 10-90 %", "s", rose, error=late),
-            Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
-            Finding(f"{name}: overshoot", "%", over),
-        ]
+        found += response_findings(name, response, "from the touch-down" * (one.touched > 0.0))
     return found
+
+
+def response_findings(name: str, response: StepResponse, since: str = "") -> list[Finding]:
+    """How a force followed a step of its command; since when it settles, where not since the step."""
+    return [
+        Finding(f"{name}: rise time 10-90 %", "s", response.rise),
+        Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
+        Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
+    ]
 
 
 def cycle_section(recording: AnalysedRecording) -> Section:
@@ -190,11 +164,12 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"Not controlled, so their stability is not evaluated: {', '.join(refused)}.")
     for one in held:
         theory = recording.theories[one.hold.name]
-        text, fate = _fate(one)
+        text, swings_on = _fate(one)
         found = [text, *(guard.sentence for guard in [theory.guarded] if guard)]
         sentences += [sentence for sentence in found if sentence not in sentences]
-        if fate is not Verdict.SETTLED:
-            (wrong if fate is Verdict.DIVERGED else verdict).append(text)
+        if swings_on:
+            is_growing = one.swinging is not None and one.swinging.swings.verdict is Verdict.DIVERGED
+            (wrong if is_growing else verdict).append(text)
         findings += _cycle_findings(one, theory)
     if not recording.held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
@@ -211,29 +186,21 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong)
 
 
-def _fate(one: HeldForce) -> tuple[str, Verdict]:
-    """A sentence on whether the force settles, and which: DIVERGED, LIMIT_CYCLE, SETTLED for all else."""
-    name, cycle = one.hold.name, one.cycle
+def _fate(one: HeldForce) -> tuple[str, bool]:
+    """A sentence on whether the force settles, and whether it, or a shaft, swings on."""
     if one.swinging is None:
         return (
-            f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.",
-            Verdict.SETTLED,
+            f"{one.hold.name}: neither the force nor a motor or joint was recorded; its stability is not known.",
+            False,
         )
-    shaft, seen = one.swinging
-    fate = seen.verdict if seen.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED) else Verdict.SETTLED
-    text = f"{name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {fate_words(seen)}"
-    if shaft and fate is not Verdict.SETTLED:
-        what = "limit cycle of" if seen.verdict is Verdict.LIMIT_CYCLE else "last"
-        text += f"; {what} {shown(seen.peak_to_peak, 'rad')} peak to peak, period {shown(seen.period, 's')}"
-    elif cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded:
-        text += (
-            f"; limit cycle of {shown(cycle.peak_to_peak, 'N')} peak to peak, period {shown(cycle.period, 's')} "
-            f"(confidence {cycle.confidence:.2f})"
-        )
-        fate = Verdict.LIMIT_CYCLE if fate is Verdict.SETTLED else fate
-    else:
-        text += "; no limit cycle detected"
-    return f"{text}.", fate
+    (shaft, seen), cycle = one.swinging, one.cycle
+    text = f"{one.hold.name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {fate_words(seen)}"
+    is_cycle = cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded
+    if not (is_cycle or seen.verdict in SWINGS_ON):
+        return f"{text}; no limit cycle detected.", False
+    swing, what = cycle if is_cycle else seen, "last" if seen.verdict is Verdict.DIVERGED else "limit cycle of"
+    size = shown(swing.peak_to_peak, "rad" if shaft else "N")
+    return f"{text}; {what} {size} peak to peak, period {shown(swing.period, 's')}.", True
 
 
 def fate_words(seen: Swings) -> str:
@@ -251,17 +218,17 @@ def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
     size, time, sure = cycle.peak_to_peak, cycle.period, cycle.confidence
     if not sure >= CYCLE.sure:
         size = time = sure = math.nan
-    force, period = (math.nan,) * 2 if predicted is None else (predicted.force_peak_to_peak, predicted.period)
+    force = predicted.force_peak_to_peak
     yield Finding(f"{name}: limit cycle, peak to peak", "N", size, force, STICTION * math.isfinite(force))
-    yield Finding(f"{name}: period of the limit cycle", "s", time, period)
+    yield Finding(f"{name}: period of the limit cycle", "s", time, predicted.period)
     yield Finding(f"{name}: confidence of the limit cycle", "", sure)
-    if seen is not None and seen.shaft and seen.swings.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
+    if seen is not None and seen.shaft and seen.swings.verdict in SWINGS_ON:
         yield Finding(f"{name}: swing of {seen.shaft}, peak to peak", "rad", seen.swings.peak_to_peak)
         yield Finding(f"{name}: period of the swing", "s", seen.swings.period)
     if theory.guarded is not None:
         guard, surface = theory.guarded.assessment, shown(theory.guarded.surface, "N/m")
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
         yield Finding(f"{name}: gain margin (up to {GUARD.largest_scale:g})", "", math.nan, guard.scale, note)
-    if predicted is not None and (size := predicted.actuator_peak_to_peak) > 0.0:
+    if (size := predicted.actuator_peak_to_peak) > 0.0:
         label = f"{name}: cycle of the motors due to Coulomb friction, at the contact, peak to peak"
         yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")

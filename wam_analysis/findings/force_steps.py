@@ -6,13 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, counted, shown, times
-from wam_analysis.findings.force import fate_words
+from wam_analysis.findings.force import fate_words, response_findings
 from wam_analysis.findings.repetition import is_known
 from wam_analysis.foreign.sources import Source, jumps, pieces
 from wam_analysis.held_messages import row_at
-from wam_analysis.measures.response import StepResponse, step_response
-from wam_analysis.measures.runs import noise
-from wam_analysis.measures.swings import Swings, swings
+from wam_analysis.measures.response import StepResponse, force_response
+from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, SHAFT, STREAM
 from wam_bag.arrays import Numbers
@@ -89,21 +88,12 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
             if np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
             time, reached = piece.time[after] - begin, value[after]
-            response, band = _response(time, reached, before, size), max(HOLD.loud * size, 4.0 * noise(reached))
             left, to = (float(one @ way) for one in (last, desired[row]))
+            start = float(np.mean(before)) if len(before) else math.nan
             is_first = not row and is_known(command, measured.time)
-            swinging = swings(time, reached - to, 2.0 * band, band)
+            response, swinging = force_response(time, reached, start, to, size)
             found.append(ForceStep(measured.label, begin, math.nan if is_first else left, to, response, swinging))
     return found
-
-
-def _response(time: Numbers, value: Numbers, before: Numbers, size: float) -> StepResponse:
-    """Of a force to a step of a size; the steady state alone where what was before, or the rise, was not recorded."""
-    steady = HOLD.steady * float(time[-1])
-    tail = value[time >= time[-1] - steady]
-    if not len(before) or abs(np.mean(tail) - np.mean(before)) < HOLD.loud * size:
-        return StepResponse(float(np.mean(tail)), math.nan, math.nan, math.nan, float(np.ptp(tail)) / 2.0, math.nan)
-    return step_response(time, value, float(np.mean(before)), steady, HOLD.band)
 
 
 def step_section(recording: AnalysedRecording) -> Section:
@@ -139,9 +129,7 @@ def step_section(recording: AnalysedRecording) -> Section:
             doubts.append(f"{name}: the force {fate_words(step.swings)}.")
         findings += [
             Finding(f"{name}: force in the steady state", "N", response.final, step.commanded),
-            Finding(f"{name}: rise time 10-90 %", "s", response.rise),
-            Finding(f"{name}: settling time to 5 %", "s", response.settling),
-            Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
+            *response_findings(name, response),
             Finding(f"{name}: ripple", "N", response.ripple),
         ]
     shows = []

@@ -20,7 +20,7 @@ from wam_analysis.findings.prediction import (
 from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.holds import Hold, measured_force
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
-from wam_analysis.measures.response import StepResponse, step_response
+from wam_analysis.measures.response import StepResponse, force_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.recorded import PredictionParameters
@@ -131,10 +131,18 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     held = HeldForce(hold, time, measured, time_true, true, cover=cover, position=position, is_pushed=pushed)
     if hold.is_refused:
         return held
-    touched = _touch_down(traces, parameters, hold)
-    response = _response(hold, time, measured, HOLD.steady * duration) if held.is_touching else None
-    if response is not None and touched > 0.0:
-        response = response._replace(settling=max(response.settling - touched, 0.0))
+    touched, before = _touch_down(traces, parameters, hold), _before(traces, hold, measured)
+    known, response = np.isfinite(true), None
+    at, force = (time, measured) if len(measured) else (time_true[known], true[known])
+    if len(force):
+        followed, of_force = force_response(at, force, float(force[0]), hold.commanded, hold.commanded)
+        swinging: Swinging | None = Swinging("", of_force)
+        if held.is_touching and len(measured) >= SHAFT.fewest_samples and not math.isnan(followed.settling):
+            response = followed._replace(settling=max(followed.settling - np.fmax(touched, 0.0), 0.0))
+            if before or not math.isnan(touched):  # they are those of the impact
+                response = response._replace(rise=math.nan, overshoot=math.nan)
+    else:
+        swinging = _swinging_shaft(run, hold)
     steady, late = ((1.0 - part) * duration for part in (HOLD.steady, CYCLE.late_part))
     compared = (signals["estimated"][0] >= steady) & np.isfinite(estimated)  # on this link
     bound = traces.estimated.is_lower_bound[rows][compared]
@@ -145,11 +153,11 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     return held._replace(
         response=response,
         touched=touched,
-        before=_before(traces, hold, measured),
+        before=before,
         accuracy=UNMEASURED if hold.is_short else accuracy,  # a short one has no steady part
         cycle=next(filter(None, cycles), NO_CYCLE),
         is_lower_bound=float(np.sum(bound)) > TOUCH.lasting * len(bound),
-        swinging=_swinging(run, hold, *((time, measured) if len(measured) else (time_true, true))),
+        swinging=swinging,
     )
 
 
@@ -172,18 +180,6 @@ def _accuracy(error: Numbers) -> ForceAccuracy:
         return ForceAccuracy()
     low, high = np.percentile(error, [0.5, 99.5]).tolist()
     return ForceAccuracy(float(np.mean(error)), (high - low) / 2.0)
-
-
-def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> StepResponse | None:
-    if len(time) < SHAFT.fewest_samples:
-        return None
-    begin = float(measured[0])
-    if abs(hold.commanded - begin) < max(4.0 * noise(measured), HOLD.loud * hold.commanded):
-        return None
-    try:
-        return step_response(time, measured, begin, steady, HOLD.band)
-    except ValueError:
-        return None
 
 
 def _touch_down(traces: Traces, parameters: PredictionParameters, hold: Hold) -> float:
@@ -240,16 +236,8 @@ def _touched(traces: Traces, parameters: PredictionParameters, during: Mask) -> 
     return (loop.contact_cover, loop.contact_position) if loop is not None else ("", math.nan)
 
 
-def _swinging(run: RecordedRun, hold: Hold, time: Numbers, force: Numbers) -> Swinging | None:
-    """The swings of a force, (n,), N; without one those of the motor, or else the joint, that show most about a hold.
-
-    None if nothing was recorded.
-    """
-    good = np.isfinite(force)
-    time, force = time[good], force[good]
-    if len(force):
-        band = max(HOLD.loud * hold.commanded, 4.0 * noise(force))
-        return Swinging("", swings(time, hold.commanded - force, 2.0 * band, band))
+def _swinging_shaft(run: RecordedRun, hold: Hold) -> Swinging | None:
+    """The swings of the motor, or else the joint, that show most about a hold; None if nothing was recorded."""
     found: list[Swinging] = []
     for topic in ("motor_states", "joint_sensors", "joint_states"):
         if (columns := run.joints(topic)) is None or found:
@@ -274,8 +262,8 @@ class Theory(NamedTuple):
     moved : size of the cycle of a motor as a motion of the contact along the force, m; NaN if it is not known.
     """
 
-    predicted: Predicted | None = None
-    largest: LargestForce | None = None
+    predicted: Predicted = Predicted()
+    largest: LargestForce = LargestForce()
     guarded: Guarded | None = None
     moved: float = math.nan
 
@@ -297,7 +285,7 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
     largest = largest_force(press)
     if node is None:
         return Theory(largest=largest)
-    loop, predicted = parameters.force_loop, None
+    loop, predicted = parameters.force_loop, Predicted()
     if loop is not None and loop.mode == "hybrid":
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
         predicted = predict(node, gain, proportional)

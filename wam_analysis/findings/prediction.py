@@ -75,9 +75,9 @@ class Predicted(NamedTuple):
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
     """
 
-    force_peak_to_peak: float
-    period: float
-    actuator_peak_to_peak: float
+    force_peak_to_peak: float = math.nan
+    period: float = math.nan
+    actuator_peak_to_peak: float = math.nan
 
 
 def node_at(recorded: PredictionParameters, press: PressedPoint) -> Node | None:
@@ -130,7 +130,7 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     """
     j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
-        return Predicted(math.nan, math.nan, math.nan)
+        return Predicted()
     fs, fd = node.static_friction, node.dynamic_friction
     zeta = float(linear_loop.damping_ratio(j, b, ktr, kc))
     gamma = float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain))
@@ -145,10 +145,10 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
 
 
 class LargestForce(NamedTuple):
-    """Largest force that the arm can press with, N, and its limit."""
+    """Largest force that the arm can press with, N, and its limit; NaN if it is not known."""
 
-    force: float
-    limited_by: str
+    force: float = math.nan
+    limited_by: str = ""
 
 
 def largest_force(press: PressedPoint) -> LargestForce:

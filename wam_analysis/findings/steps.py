@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.findings.finding import Section, stated
+from wam_analysis.findings.finding import Section
 from wam_analysis.held_messages import by_names, joint_angles, row_at
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, TOUCH
@@ -61,11 +61,9 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     """Whether the commands of a scenario were carried out; None without a scenario."""
     if not recording.steps:
         return None
-    outcomes, (brief, why), answers = _outcomes(recording), recording.unassessed, verdict(recording)
+    (brief, why), answers = recording.unassessed, verdict(recording)
     failed = [f"{one.question} ({one.worst})" for one in answers if one.result is VerdictResult.NO]
     wrong = [f"Failed: {', '.join(failed)}."] if failed else []
-    missed = {what: outcomes[what] for what in OUTCOMES[1:] if outcomes[what]}
-    wrong += [stated(f"{what} at the end of: {'; '.join(steps)}") for what, steps in missed.items()]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
     stated_answers = (HOW, *(f"{answer}." for answer in answers)) if answers else ("Nothing in them can be evaluated.",)
     return Section("steps", "Result of the steps", stated_answers, wrong=wrong)
@@ -167,11 +165,11 @@ def _force_verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
 
 def _command_verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     """Commands that were not carried out; nothing if there is none, and all could be assessed."""
-    counts = [f"{len(names)} {what}" for what, names in _outcomes(recording).items() if names]
+    missed = [f"{what}: {', '.join(names)}" for what, names in _outcomes(recording).items() if names]
     brief, why = recording.unassessed
-    if counts or brief:
-        result = VerdictResult.NO if counts else VerdictResult.NOTHING
-        yield VerdictAnswer("commands carried out", result, ", ".join(counts), f"{len(brief)} {why}" * bool(brief))
+    if missed or brief:
+        result = VerdictResult.NO if missed else VerdictResult.NOTHING
+        yield VerdictAnswer("commands carried out", result, "; ".join(missed), f"{len(brief)} {why}" * bool(brief))
 
 
 def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.measures.runs import noise, smoothed
-from wam_analysis.thresholds import CYCLE
+from wam_analysis.measures.swings import Swings, swings
+from wam_analysis.thresholds import CYCLE, HOLD
 from wam_bag.arrays import Numbers
 
 
@@ -16,23 +17,23 @@ class StepResponse(NamedTuple):
     Attributes
     ----------
     final : mean of the steady end.
-    rise : from 10 % to 90 % of the way to `final`, s; NaN if it does not get there.
-    settling : until the signal stays within the band about `final`, s; infinite if it leaves the band in the
-        steady end.
-    overshoot : largest excess over `final` as a fraction of the step, 0 if there is none.
     ripple : half of the range in the steady end.
-    rise_error : of `rise`, s: a sample, and the ripple over the slope of the rise.
+    rise : from 10 % to 90 % of the way to `final`, s; NaN if it does not get there, or there is no step.
+    settling : until the signal stays within the band about `final`, s; infinite if it leaves the band in the
+        steady end; NaN if there is no step.
+    overshoot : largest excess over `final` as a fraction of the step, 0 if there is none; NaN likewise.
     """
 
     final: float
-    rise: float
-    settling: float
-    overshoot: float
     ripple: float
-    rise_error: float
+    rise: float = math.nan
+    settling: float = math.nan
+    overshoot: float = math.nan
 
 
-def step_response(time: Numbers, value: Numbers, begin: float, steady: float, band: float) -> StepResponse:
+def step_response(
+    time: Numbers, value: Numbers, begin: float, steady: float, band: float, least: float = 0.0
+) -> StepResponse:
     """Rise, settling and overshoot of a recorded step.
 
     Noise is averaged over as many samples as it takes to bring it well below the band, or over fewer where
@@ -42,33 +43,27 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     ----------
     time : (n,), s from the step, rising, at a constant rate.
     value : (n,), the signal.
-    begin : value before the step.
+    begin : value before the step; NaN where it is not known.
     steady : length of the end that counts as steady, s.
     band : settling band as a part of the step, for example 0.02.
-
-    Raises
-    ------
-    ValueError
-        if there are fewer than eight samples or the signal ends where it began.
+    least : a change that is not larger is no step.
     """
-    if len(time) != len(value) or len(time) < 8:
-        raise ValueError(f"a step response of {len(value)} samples at {len(time)} times; at least 8 of both are needed")
     tail = value[time >= time[-1] - steady]
-    final = float(np.mean(tail))
+    final, ripple = float(np.mean(tail)), float(np.ptp(tail)) / 2.0
     step = final - begin
-    if step == 0.0 or not math.isfinite(step):
-        raise ValueError(f"the signal ends at {final:g}, where it began; there is no step to evaluate")
+    if not abs(step) > least:
+        return StepResponse(final, ripple)
     sd = noise(value) / abs(step)
-    least, width = (
+    narrowest, width = (
         min(math.ceil((4.0 * sd / (q * band)) ** 2), len(value) // 50 or 1)
         for q in (CYCLE.step_loudest, CYCLE.step_quiet)
     )
     while True:
         part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
         low, high = _crossing(time, part, 0.1), _crossing(time, part, 0.9)
-        if width <= least or not high - low < CYCLE.sharp * width * float(time[1] - time[0]):
+        if width <= narrowest or not high - low < CYCLE.sharp * width * float(time[1] - time[0]):
             break
-        width = max(width // 2, least)
+        width = max(width // 2, narrowest)
     outside = np.flatnonzero(np.abs(part - 1.0) > band)
     if not len(outside):
         settling = 0.0
@@ -76,16 +71,20 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         settling = math.inf  # what leaves the band in the steady end has not settled, wherever the recording stops
     else:
         settling = _between(time, np.abs(part - 1.0), int(outside[-1]), band)
-    ripple = float(np.ptp(tail)) / 2.0
-    period = float(time[-1] - time[0]) / (len(time) - 1)
-    return StepResponse(
-        final=final,
-        rise=high - low,
-        settling=settling,
-        overshoot=max(float(np.max(part)) - 1.0, 0.0),
-        ripple=ripple,
-        rise_error=math.hypot(period, (high - low) * ripple / (0.8 * abs(step))),
-    )
+    return StepResponse(final, ripple, high - low, settling, max(float(np.max(part)) - 1.0, 0.0))
+
+
+def force_response(
+    time: Numbers, force: Numbers, before: float, commanded: float, size: float
+) -> tuple[StepResponse, Swings]:
+    """Response of a force, (n,), N, to a command that changes by a size, N, and the swings of its error.
+
+    A response that is smaller than an error which counts as settled is no step.
+    """
+    error, small = force - commanded, HOLD.loud * size
+    band = max(small, 4.0 * noise(error))
+    response = step_response(time, force, before, HOLD.steady * float(time[-1]), HOLD.band, small)
+    return response, swings(time, error, 2.0 * band, band)
 
 
 def _crossing(time: Numbers, part: Numbers, level: float) -> float:
