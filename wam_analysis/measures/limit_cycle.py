@@ -8,7 +8,7 @@ import numpy as np
 
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import CYCLE
-from wam_bag.arrays import Index, Numbers
+from wam_bag.arrays import Numbers
 
 
 class LimitCycle(NamedTuple):
@@ -111,10 +111,10 @@ class CycleExtent(NamedTuple):
     period: float
 
 
-def mean_cycle(time: Numbers, value: Numbers) -> CycleExtent:
-    """The cycle in the second half of a signal that is known to cycle: its extremes and its mean period.
+def last_cycle(time: Numbers, value: Numbers) -> CycleExtent:
+    """The last whole cycle of a signal that is known to cycle, from one rising crossing of the middle to the next.
 
-    Unlike `limit_cycle` it takes every rising crossing of the middle for a cycle: the signal must have no noise.
+    Unlike `limit_cycle` it takes every such crossing for a cycle: the signal must have no noise.
 
     Parameters
     ----------
@@ -122,32 +122,19 @@ def mean_cycle(time: Numbers, value: Numbers) -> CycleExtent:
     value : (n,), the signal.
     """
     late = value[len(value) // 2 :]
-    rises = _rises(late, late)
-    if len(rises) < 2:
-        return CycleExtent(math.nan, math.nan)
-    return CycleExtent(float(np.ptp(late)), float(np.diff(rises).mean() * (time[1] - time[0])))
-
-
-def last_cycle(time: Numbers, value: Numbers) -> CycleExtent:
-    """The last whole cycle of a signal that is known to cycle, from one rising crossing to the next.
-
-    The one to take if the cycle still converges, or if there are few; otherwise as `mean_cycle`.
-    """
-    rises = _rises(value, value[len(value) // 2 :])
+    above = value > 0.5 * (late.max() + late.min())
+    rises = np.flatnonzero(above[1:] & ~above[:-1])  # samples before each
     if len(rises) < 2:
         return CycleExtent(math.nan, math.nan)
     begin, end = rises[-2], rises[-1]
     return CycleExtent(float(np.ptp(value[begin : end + 1])), float(time[end] - time[begin]))
 
 
-def _rises(value: Numbers, late: Numbers) -> Index:
-    """Samples before each rising crossing of the middle between the extremes of the late part of a signal."""
-    above = value > 0.5 * (late.max() + late.min())
-    return np.flatnonzero(above[1:] & ~above[:-1])
-
-
 def _period(flat: Numbers) -> float:
-    """Lag of the first of the highest peaks of the autocorrelation, in samples, refined; NaN for none."""
+    """Lag of the first of the highest peaks of the autocorrelation, in samples, refined; NaN for none.
+
+    The peaks of a fast cycle are between the samples: a peak is as high as the cosine through it and its neighbours.
+    """
     n = len(flat)
     size = 1 << (2 * n - 1).bit_length()
     power = np.abs(np.fft.rfft(flat, size)) ** 2
@@ -157,19 +144,17 @@ def _period(flat: Numbers) -> float:
     if not len(negative):
         return math.nan
     first = int(negative[0])
-    inner = likeness[first + 1 : longest]
-    peaks = (
-        first
-        + 1
-        + np.flatnonzero((inner >= likeness[first:][: len(inner)]) & (inner > likeness[first + 2 :][: len(inner)]))
-    )
-    peaks = peaks[likeness[peaks] > 0.0]
+    three = likeness[np.arange(first, longest - 1) + np.arange(3)[:, None]]
+    peaks = np.flatnonzero((three[1] >= three[0]) & (three[1] > three[2]) & (three[1] > 0.0))
     if not len(peaks):
         return math.nan
-    guess = _top(likeness, int(peaks[likeness[peaks] >= CYCLE.correlated * np.max(likeness[peaks])][0]))
+    before, peak, after = three[:, peaks]
+    turn = np.clip(0.5 * (before + after) / peak, -1.0, 1.0)
+    heights = np.hypot(peak, 0.5 * (after - before) / np.sqrt(np.maximum(1.0 - turn**2, 1e-300)))
+    guess = _top(likeness, first + 1 + int(peaks[heights >= CYCLE.correlated * np.max(heights)][0]))
     times = 2
     while guess >= 1.0 and times * guess < n / 2.0 - 1.0:
-        reach = max(2, int(guess / 4.0))
+        reach = max(1, int(guess / 4.0))
         middle = round(times * guess)
         low, high = max(middle - reach, 1), min(middle + reach + 1, len(likeness) - 1)
         if high - low < 3:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_analysis.measures.limit_cycle import mean_cycle
+from wam_analysis.measures.limit_cycle import last_cycle
 from wam_analysis.table import markdown
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_sim.batch import processes, results
@@ -120,7 +120,7 @@ def backlash_in_a_torque_loop() -> PlantCurve:
     """
     wanted = np.array([60.0, 150.0, 334.0, 477.0])
     exact = [exact_cycle(torque_loop(hertz)).frequency / (2.0 * np.pi) for hertz in wanted.tolist()]
-    return _curve(wanted, lambda hertz: 1.0 / mean_cycle(*torque_loop_response(hertz)).period, exact)
+    return _curve(wanted, lambda hertz: 1.0 / last_cycle(*torque_loop_response(hertz)).period, exact)
 
 
 def damped_impact() -> PlantCurve:
