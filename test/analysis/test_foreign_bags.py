@@ -365,7 +365,7 @@ def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
     assert numbers["/joint_states: missed periods"] == 0.0
     assert "a over time." in page(analysis)
     happened = " ".join(line for section in analysis.sections[:2] for line in section.sentences)
-    assert "/joint_states: b without a value that is a number." in happened
+    assert "/joint_states: b without a number for position, velocity or effort." in happened
     assert f"/wrench: {len(time)} forces, none of which is a number." in happened
     stamps = ORIGIN + 10**7 * np.arange(100)
     assert np.array_equal(rising(np.where(np.arange(100) % 5 == 3, 0, stamps), stamps + 800_000), stamps)

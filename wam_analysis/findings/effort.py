@@ -26,7 +26,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
     sentences, findings, brief, alone = [], [], [], []
     doubts, wrong = list[str](), list[str]()
     moving = [one for one in states if one.is_joint and not rests(one)]
-    driven = {one.name for one in moving if np.any(one.values.get("effort", 0.0))}
+    driven = {one.name for one in moving if np.any(np.nan_to_num(one.values.get("effort", 0.0)))}
     for one in moving:
         if unlike := contradiction(one) or _limited(one):
             wrong.append(f"{one.label}: {unlike}, so friction and inertia are not computed.")
@@ -39,7 +39,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            if driven and np.any(one.values.get("effort", one.name not in driven)) and one.values.keys() != {"effort"}:
+            acting = np.nan_to_num(one.values.get("effort", one.name not in driven))
+            if driven and np.any(acting) and one.values.keys() != {"effort"}:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue

@@ -28,9 +28,8 @@ def stick_section(recording: AnalysedRecording) -> Section:
         position = one.only("position").values.get("position", np.zeros(1))
         if not found.begins and found.shortest and np.ptp(position) > SHAFT.joint_rest * SHAFT.way:
             far = shown(float(np.ptp(position)), one.units["position"])
-            sentences.append(
-                f"{one.label}: moved by {far}, more slowly than the noise of its velocity, or too briefly."
-            )
+            slow = f"{shown(found.slowest or least)} {one.units['position']}/s"
+            sentences.append(f"{one.label}: moved by {far}, more slowly than {slow}, or too briefly.")
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),

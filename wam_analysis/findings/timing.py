@@ -107,6 +107,7 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
     metadata = dict(bag.metadata.get(RECORDING, {}))
     counts = {name: len(columns.log_time_ns) for name, columns in bag.topics.items()}
     whole = bag.counts or counts
+    read = [counts.get(name, 0) for name in whole]  # a message of a controller has its command, too
     try:
         here = version("wam_stack")
     except PackageNotFoundError:
@@ -115,8 +116,8 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
         "bag": str(bag.path),
         **({} if recording.is_foreign else {"arm": recording.namespace or "/"}),
         "mode": recording.mode,
-        "topics": _part_of(sum(count > 0 for count in counts.values()), len(whole)),
-        "messages": _part_of(sum(counts.values()), sum(whole.values())),
+        "topics": _part_of(sum(count > 0 for count in read), len(whole)),
+        "messages": _part_of(sum(read), sum(whole.values())),
         "lost": " ".join(recording.lost) or "none known",
         "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",
         **({"parameters, notes": "; ".join(recording.run.parameters.notes)} if recording.run.parameters.notes else {}),

@@ -50,7 +50,7 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         numbers = np.hstack([columns.position, columns.velocity, columns.effort])
         number = len(columns.names)
         if none := [joint for i, joint in enumerate(columns.names) if not np.isfinite(numbers[:, i::number]).any()]:
-            yield f"{name}: {', '.join(none)} without a value that is a number."
+            yield f"{name}: {', '.join(none)} without a number for position, velocity or effort."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
         sizes = np.sqrt(np.nansum(columns.force**2, axis=1))[np.isfinite(columns.force).any(axis=1)]
         what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"

@@ -225,8 +225,9 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     steps, waits = np.diff(stamps), np.diff(received[rows])
     same = steps == 0
     number, of = int(np.sum(same)), len(rows)
-    numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
-    changed = np.any(numbers[1:] != numbers[:-1], axis=1)
+    known = np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1])[rows]
+    numbers = np.nan_to_num(known)
+    changed = np.any((numbers[1:] != numbers[:-1]) & np.isfinite(known[1:]), axis=1)  # a copy may have less
     kept, what = np.concatenate([[True], ~same]), Treatment.TWICE
     is_uneven = len(steps) > 0 and not number and np.std(steps) > STREAM.pace * np.median(steps)
     if is_uneven and 0.0 < np.mean(changed) <= STREAM.relayed:
@@ -395,7 +396,8 @@ def _spikes(value: Numbers) -> Index:
     """Rows of single samples away from both neighbours, by more than all others extend over."""
     value = np.where(np.isfinite(value), value, math.nan)
     steps = np.diff(value)
-    away = np.where(steps[1:] * steps[:-1] < 0.0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
+    there, back = steps[:-1], -steps[1:]
+    away = np.fmax(0.0, np.fmax(np.minimum(there, back), np.minimum(-there, -back)))
     if len(away) < SHAFT.fewest_samples:
         return np.zeros(0, np.int64)
     ends = STREAM.repeated, 1.0 - STREAM.repeated
