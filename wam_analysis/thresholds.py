@@ -169,6 +169,7 @@ class IdentificationThresholds:
     friction: float = 0.5  # of the present Coulomb friction
     load: float = 0.1  # friction per transmitted torque
     viscous: float = 1.0  # of the present viscous friction
+    stribeck: float = 1.5  # rad/s, and the least that a fit begins with: a smaller one is hardly seen
     rotor: float = 0.2  # of the present rotor inertia
     constants_difference: float = 0.012  # half the difference of two torque constants, each calibrated to 3 %, uniform
     mass: float = 0.3  # of the present mass
@@ -183,14 +184,12 @@ class IdentificationThresholds:
     huber: float = 1.5  # standard deviations from which a residual counts less
     law: float = 0.003  # standard deviation of friction, per friction, by what its law leaves out
     asymmetry: float = 0.1  # sd of the part of a shared joint's load friction that has one sign, per load friction
-    warm_iterations: int = 2  # iterations that start near the solution
     averaged: int = 9  # windows, over which equations are averaged to see what the estimate depends on
     identified: float = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
     pinned: float = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
     lightest: float = 0.1  # of the present mass of a link and inertia of a rotor, below which no estimate goes
     unexplained: float = 1.5  # rms of held-out motion per rms of the estimate's own
     remaining: float = 0.1  # rms that stays unexplained, per Coulomb friction
-    worth: float = 0.04  # part of the squared error by which another v_s must be better than the present one
     least_inertia: float = 1e-6  # kg m^2; an inertia that came out negative
     least_column: float = 1e-12  # size of a column that the motion does not show
     least_variance: float = 1e-30  # variance of a combination that has none

@@ -197,7 +197,7 @@ def test_the_covariance_in_the_overlay_is_that_of_the_torques_in_the_motion(
     assert np.linalg.eigvalsh(every / np.sqrt(np.outer(every.diagonal(), every.diagonal()))).min() > 0.0
     assert every == pytest.approx(tracked.covariance, rel=1e-4)
     samples = motion(planted.time, planted.theta, planted.torque)
-    regressor = Regressor(SHARED, found.unknowns, samples, found.stribeck_velocity)
+    regressor = Regressor(SHARED, found.unknowns, samples)
     torques, used = regressor.equations(found.values).columns, regressor.equations(found.values).is_used
     own = [found.unknowns.names.index(name) for name in tracked.names if name in found.unknowns.names]
     assert len(own) == len(tracked.names) - 7, "joint 1 carries no weight"

@@ -160,7 +160,7 @@ def test_the_identified_model_keeps_the_products_of_inertia(arm: Arm) -> None:
     for i, mass in enumerate(arm.links.mass):
         centre = np.array(arm.links.centre[3 * i : 3 * i + 3])
         link = np.array([mass, *(mass * centre), *arm.links.inertia[3 * i : 3 * i + 3]])
-        ten, _ = about_origin(link, arm.links.product[3 * i : 3 * i + 3])
+        ten = about_origin(link, arm.links.product[3 * i : 3 * i + 3])
         expected = pin.Inertia(mass, centre, arm.links.tensor(i)).toDynamicParameters()
         np.testing.assert_allclose(ten, expected, rtol=0, atol=1e-12)
 

@@ -67,7 +67,7 @@ def _symptoms(shared: Shared, motion: MotionSamples, found: Identification) -> I
         share = float(left / max(friction, IDENTIFY.least_friction))
         if share > IDENTIFY.contradicted:
             yield Contradiction(Mistake.UNEXPLAINED, (name,), share)
-    regressor = Regressor(shared, unknowns, motion, found.stribeck_velocity)
+    regressor = Regressor(shared, unknowns, motion)
     before, now = (
         np.abs(np.sum(regressor.joint_torques(each), axis=(0, 3))).sum() for each in (unknowns.present, found.values)
     )
@@ -104,8 +104,7 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
 
 def _torques(shared: Shared, unknowns: Unknowns, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
     """Torques of the configured arm and the recorded ones, N m, and where they count, (k, n) each."""
-    stribeck = np.array(shared.model.motors.stribeck_velocity)
-    equations = Regressor(shared, unknowns, motion, stribeck).equations(unknowns.present)
+    equations = Regressor(shared, unknowns, motion).equations(unknowns.present)
     return equations.columns @ unknowns.present + motion.torque - equations.torque, motion.torque, equations.is_used
 
 

@@ -1,4 +1,4 @@
-"""Estimate of the parameters: robust least squares with a prior; covariance by jackknife; cross-validation.
+"""Estimate of the parameters: robust least squares with a prior; covariance by jackknife.
 
 The residuals are coloured, and what the model lacks does not average out: the variance of white residuals would be far
 too small.  So parts of the motion are left out in turn (delete-a-group jackknife, Efron & Stein 1981), and each is
@@ -6,7 +6,7 @@ predicted from all others.  What is wrong alike in all parts is added: what the 
 the estimate depends on the filter of the motion.
 """
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -32,7 +32,6 @@ class Identification(NamedTuple):
     values : (p,).
     uncertainty : of the values.
     alone : (p,), standard deviation if all other parameters were known.
-    stribeck_velocity : (n,), v_s of each motor, rad/s.
     residual, held_out, before : (n,), rms torque of each motor that the estimate, the estimate from the other parts of
         the motion, and the present model do not explain, N m.
     seconds : of the motion that was used, of each motor, (n,).
@@ -44,7 +43,6 @@ class Identification(NamedTuple):
     values: Numbers
     uncertainty: Uncertainty
     alone: Numbers
-    stribeck_velocity: Numbers
     residual: Numbers
     held_out: Numbers
     before: Numbers
@@ -86,7 +84,7 @@ class Identification(NamedTuple):
 
 
 class _Estimate(NamedTuple):
-    """One fit, with the v_s of its regressor; `errors` (parts, n) are squared ones of held-out motion."""
+    """One fit."""
 
     equations: Equations
     part: Rows
@@ -95,7 +93,6 @@ class _Estimate(NamedTuple):
     prior_sd: Numbers
     information: Numbers  # (p, p), of all parts
     held_out: Numbers
-    errors: Numbers
 
 
 def identify(shared: Shared, motion: MotionSamples) -> Identification:
@@ -112,34 +109,20 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
         if no motor turns in one direction for long enough.
     """
     sought = unknowns(shared)
-    present = np.array(shared.model.motors.stribeck_velocity)
-
-    def estimate(velocity: Numbers, start: Numbers | None = None) -> _Estimate:
-        return _estimate(Regressor(shared, sought, motion, velocity), sought, start)
-
-    still = _still(shared, Regressor(shared, sought, motion, present).equations(sought.present))
-    if len(still) == len(present):
+    still = _still(shared, Regressor(shared, sought, motion).equations(sought.present))
+    if len(still) == len(shared.arm.joints.names):
         raise ValueError(
             f"no joint turns freely for {IDENTIFY.least_motion:g} s: let each motor turn, faster than "
             f"{IDENTIFY.slowest_motor:g} rad/s, in both directions"
         )
     sought = with_kept_weight(sought, shared, still)
-    first = estimate(present)
-    tried = [estimate(np.full(len(present), velocity), first.values) for velocity in VELOCITIES]
-    chosen, without = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
-    regressor = Regressor(shared, sought, motion, chosen)
-    best = _estimate(regressor, sought)
+    regressor = Regressor(shared, sought, motion)
+    best = _estimate(regressor)
     moved = _moved_by_averaging(best, sought._replace(prior_sd=best.prior_sd).prior)
     best = best._replace(values=np.maximum(best.values + moved, _least(sought)))
-    # the uncertainty of v_s is part of that of the friction of its motor
-    slope = slopes(np.array([one.values for one in tried]), chosen)
-    off = np.log(without / chosen)
-    for i, name in enumerate(shared.arm.motors.names):
-        own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
-        best.without[:, own] += np.outer(off[:, i], slope[i, own])
     uncertainty = _uncertainty(regressor, best, moved)
     tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
-    return _result(sought, best, chosen, uncertainty, tracked)
+    return _result(sought, best, uncertainty, tracked)
 
 
 def _still(shared: Shared, equations: Equations) -> list[int]:
@@ -149,12 +132,13 @@ def _still(shared: Shared, equations: Equations) -> list[int]:
     return [j for j, row in enumerate(matrix) if (seconds[row != 0.0] < IDENTIFY.least_motion).any()]
 
 
-def _estimate(regressor: Regressor, sought: Unknowns, start: Numbers | None = None) -> _Estimate:
-    values, prior_sd, centre = sought.present, sought.prior_sd.copy(), sought.present.copy()
-    if start is not None:
-        values = start
+def _estimate(regressor: Regressor) -> _Estimate:
+    sought = regressor.unknowns
+    values, prior_sd, centre = sought.present.copy(), sought.prior_sd.copy(), sought.present.copy()
+    velocities = sought.places("motors.stribeck_velocity")
+    values[velocities] = np.maximum(values[velocities], IDENTIFY.stribeck)
     least = _least(sought)
-    for _ in range(IDENTIFY.iterations if start is None else IDENTIFY.warm_iterations):
+    for _ in range(IDENTIFY.iterations):
         equations = regressor.equations(values)
         part = np.arange(len(equations.time)) * IDENTIFY.parts // len(equations.time)  # of each sample
         each = _normal(equations, part, values)
@@ -166,9 +150,7 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Numbers | None = No
     prior = sought._replace(prior_sd=prior_sd).prior
     without = np.array([_solve(information - i, vector - v, prior, centre) for i, v in zip(*each, strict=True)])
     left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
-    squares = left**2 * equations.is_used
-    errors = np.array([squares[part == i].sum(0) for i in range(IDENTIFY.parts)])
-    return _Estimate(equations, part, values, without, prior_sd, information, _rms(left, equations.is_used), errors)
+    return _Estimate(equations, part, values, without, prior_sd, information, _rms(left, equations.is_used))
 
 
 def _least(sought: Unknowns) -> Numbers:
@@ -176,6 +158,7 @@ def _least(sought: Unknowns) -> Numbers:
     least = np.array([0.0 if name.startswith(NOT_NEGATIVE) else -np.inf for name in sought.names])
     for inert in map(sought.places, ("links.mass", "motors.inertia")):
         least[inert] = IDENTIFY.lightest * sought.present[inert]
+    least[sought.places("motors.stribeck_velocity")] = IDENTIFY.slowest_motor
     return least
 
 
@@ -266,9 +249,7 @@ def _moved_by_averaging(best: _Estimate, prior: Numbers) -> Numbers:
     return solved(*averaged) - solved(equations.torque[middle], equations.columns[middle])
 
 
-def _result(
-    sought: Unknowns, best: _Estimate, velocity: Numbers, uncertainty: Uncertainty, tracked: TrackedErrors
-) -> Identification:
+def _result(sought: Unknowns, best: _Estimate, uncertainty: Uncertainty, tracked: TrackedErrors) -> Identification:
     equations = best.equations
     before = equations.torque - equations.columns @ sought.present
     left = equations.torque - equations.columns @ best.values
@@ -286,7 +267,6 @@ def _result(
         best.values,
         uncertainty,
         1.0 / np.sqrt(np.maximum(best.information.diagonal(), 1e-300)),
-        velocity,
         _rms(left, equations.is_used),
         best.held_out,
         _rms(before, equations.is_used),
@@ -294,47 +274,3 @@ def _result(
         np.array(both),
         tracked,
     )
-
-
-# the Stribeck velocity v_s of each motor: that by which held-out motion is predicted best, and its uncertainty
-
-VELOCITIES: Final = np.geomspace(0.4, 8.0, 9)  # rad/s, of the motors
-
-
-def stribeck_velocities(present: Numbers, present_errors: Numbers, errors: Numbers) -> tuple[Numbers, Numbers]:
-    """v_s of each motor, (n,), rad/s, by the squared errors of held-out motion; and without each part, (parts, n).
-
-    Parameters
-    ----------
-    present : (n,), rad/s; it is kept where no other one is clearly better.
-    present_errors : (parts, n), squared errors with it, N^2 m^2.
-    errors : (c, parts, n), those with each of `VELOCITIES`.
-    """
-    total = errors.sum(1)
-    is_better = total.min(0) < (1.0 - IDENTIFY.worth) * present_errors.sum(0)
-    best = np.where(is_better, _minimum(total), present)
-    left_out = np.array([_minimum(total - part) for part in errors.transpose(1, 0, 2)])
-    return best, np.where(is_better, left_out, present)
-
-
-def slopes(values: Numbers, velocity: Numbers) -> Numbers:
-    """Change of parameters per change of ln v_s about the v_s of each motor, (n, p).
-
-    Parameters
-    ----------
-    values : (c, p), parameters with each of `VELOCITIES`.
-    velocity : (n,), rad/s.
-    """
-    upper = np.clip(np.searchsorted(VELOCITIES, velocity), 1, len(VELOCITIES) - 1)
-    return (values[upper] - values[upper - 1]) / np.log(VELOCITIES[upper] / VELOCITIES[upper - 1])[:, None]
-
-
-def _minimum(total: Numbers) -> Numbers:
-    """Where a parabola through the least of the errors, (c, n), and its neighbours is least, (n,), rad/s."""
-    at = np.clip(total.argmin(0), 1, len(total) - 2)
-    motor = np.arange(total.shape[1])
-    below, least, above = (total[at + i, motor] for i in (-1, 0, 1))
-    curvature = below - 2.0 * least + above
-    shift = np.where(curvature > 0.0, 0.5 * (below - above) / np.where(curvature > 0.0, curvature, 1.0), 0.0)
-    step = np.log(VELOCITIES[1] / VELOCITIES[0])
-    return VELOCITIES[at] * np.exp(step * np.clip(shift, -1.0, 1.0))

@@ -59,7 +59,6 @@ def model_values(shared: Shared, found: Identification, source: str) -> dict[str
     for group, each in groups.items():
         if group.startswith("motors.") and group != "motors.torque_difference":
             values[f"model.{group}"] = _numbers(each)
-    values["model.motors.stribeck_velocity"] = _numbers(found.stribeck_velocity)
     values |= _joint_values(shared, found.unknowns, groups)
     values |= _link_values(groups)
     values["model.covariance.parameters"] = list(found.tracked.names)

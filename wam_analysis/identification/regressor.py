@@ -3,7 +3,7 @@
 The friction of a window is the mean over its states, each with the direction, speed and load of its own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
+STEP = 1e-6  # kg, kg m, kg m^2, of a link, by which the slopes of its parameters are found
 INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of the last six parameters of a link
 
 
@@ -44,13 +45,11 @@ class Regressor:
     shared : arm and present model.
     unknowns : what is estimated.
     motion : samples.
-    stribeck_velocity : (n,), v_s of each motor, rad/s.
     """
 
-    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, stribeck_velocity: Numbers) -> None:
+    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples) -> None:
         self._shared, self.unknowns, self._motion = shared, unknowns, motion
         self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
-        self._stribeck = stribeck_velocity
         # friction of joints with a motor of their own at that motor, N m: the cables transmit it
         own = np.abs(self._matrix) * [[j not in unknowns.joints] for j in range(len(self._matrix))]
         self._through = own.T @ shared.arm.joints.dynamic_friction
@@ -79,7 +78,10 @@ class Regressor:
         n = motion.theta.shape[1]
         columns = np.zeros((*motion.theta.shape, len(unknowns.names)))
         _, load = self.loads(values)
-        for group, each in self._friction(load).items():
+        friction = self._friction(load, values)
+        velocities = unknowns.places("motors.stribeck_velocity")
+        friction["motors.stribeck_velocity"] = self._by_stribeck(friction, values)
+        for group, each in friction.items():
             found = np.einsum("w,kwn->kn", motion.weights, each)
             columns[:, range(n), unknowns.places(group)] = found
         columns[:, range(n), unknowns.places("motors.inertia")] = motion.thetadd
@@ -91,12 +93,20 @@ class Regressor:
         at, jacobian, constant = self._inertial(values)
         columns[:, :, at] = self._links @ jacobian
         torque = motion.torque - self._carried - self._links @ constant
+        torque += columns[:, range(n), velocities] * values[velocities]
         return Equations(motion.time, torque, columns, self._is_used)
 
-    def _friction(self, load: Numbers) -> dict[str, Numbers]:
-        """Torque per parameter at each state, (k, w, n), by group."""
+    def _by_stribeck(self, friction: Mapping[str, Numbers], values: Numbers) -> Numbers:
+        """Torque per Stribeck velocity v_s at each state, (k, w, n), from the derivative of exp(-(v / v_s)^2)."""
+        static = [f"motors.static_{way}" for way in DIRECTIONS]
+        rise = sum(friction[group] * values[self.unknowns.places(group)] for group in static)
+        slow = values[self.unknowns.places("motors.stribeck_velocity")]
+        return np.asarray(2.0 * rise * self._motion.velocities**2 / slow**3, np.float64)
+
+    def _friction(self, load: Numbers, values: Numbers) -> dict[str, Numbers]:
+        """Torque per parameter that it is linear in at each state, (k, w, n), by group."""
         v = self._motion.velocities
-        slow = np.exp(-((v / self._stribeck) ** 2))
+        slow = np.exp(-((v / values[self.unknowns.places("motors.stribeck_velocity")]) ** 2))
         found = {"motors.viscous": v}
         for way, sign in zip(DIRECTIONS, (1.0, -1.0), strict=True):
             moves = np.where(sign * v > 0.0, sign, 0.0)
@@ -113,7 +123,7 @@ class Regressor:
         motion, unknowns = self._motion, self.unknowns
         rotor = values[unknowns.places("motors.inertia")] * motion.thetadd
         load = motion.torques - rotor[:, None, :]
-        friction = self._friction(load)
+        friction = self._friction(load, values)
         load -= sum(each * values[unknowns.places(group)] for group, each in friction.items())
         return load, load + np.sign(motion.velocities) * self._through
 
@@ -140,9 +150,9 @@ class Regressor:
     def carried_friction(self, values: Numbers) -> Numbers:
         """Friction of the motors, (k, n), N m, by one sd of the friction of own joints, which loads them."""
         (links, load), unknowns = self.loads(values), self.unknowns
-        carrying = self._friction(load + IDENTIFY.friction * (load - links))
+        carrying = self._friction(load + IDENTIFY.friction * (load - links), values)
         found = np.zeros(load.shape)
-        for group, each in self._friction(load).items():
+        for group, each in self._friction(load, values).items():
             found += (carrying[group] - each) * values[unknowns.places(group)]
         return np.asarray(np.einsum("w,kwn->kn", self._motion.weights, found), np.float64)
 
@@ -167,30 +177,24 @@ class Regressor:
         at = np.array([unknowns.places(f"links.{group}") for group in groups])  # (7, n)
         jacobian, constant = np.zeros((10 * n, 7 * n)), np.zeros(10 * n)
         for i in range(n):
-            ten, slope = about_origin(values[at[:, i]], links.product[3 * i : 3 * i + 3])
+            link, product = values[at[:, i]], links.product[3 * i : 3 * i + 3]
+            ways = STEP * np.eye(7)
+            after, before = (np.array([about_origin(link + side * way, product) for way in ways]) for side in (1, -1))
+            slope = (after - before).T / (2.0 * STEP)
             rows, own = slice(10 * i, 10 * i + 10), np.arange(7) * n + i
             jacobian[rows, own] = slope
-            constant[rows] = ten - slope @ values[at[:, i]]
+            constant[rows] = about_origin(link, product) - slope @ link
         return at.ravel().tolist(), jacobian, constant
 
 
-def about_origin(link: Numbers, product: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Numbers, Numbers]:
-    """The ten parameters of a link about its frame's origin, (10,), and their slopes, (10, 7).
+def about_origin(link: Numbers, product: Sequence[float]) -> Numbers:
+    """The ten parameters of a link about its frame's origin, (10,).
 
     Parameters
     ----------
     link : (7,), mass, kg; mass times centre, kg m; moments of inertia about the centre, kg m^2.
     product : elements xy, xz, yz of that inertia, kg m^2, which are not estimated.
     """
-    mass, moment = float(link[0]), link[1:4]
-    square = moment @ moment * np.eye(3) - np.outer(moment, moment)
-    centre = np.diag(link[4:])
-    for (a, b), own in zip(((0, 1), (0, 2), (1, 2)), product, strict=True):
-        centre[a, b] = own
-    ten, slope = np.zeros(10), np.zeros((10, 7))
-    ten[:4], slope[:4, :4] = link[:4], np.eye(4)
-    ten[4:], slope[4:, 0] = (centre + square / mass)[INERTIA], -square[INERTIA] / mass**2
-    for i, axis in enumerate(np.eye(3)):
-        turned = 2.0 * moment[i] * np.eye(3) - np.outer(axis, moment) - np.outer(moment, axis)
-        slope[4:, 1 + i], slope[4:, 4 + i] = turned[INERTIA] / mass, np.diag(axis)[INERTIA]
-    return ten, slope
+    moment, (xx, yy, zz), (xy, xz, yz) = link[1:4], link[4:], product
+    shifted = (moment @ moment * np.eye(3) - np.outer(moment, moment)) / link[0]
+    return np.concatenate([link[:4], shifted[INERTIA] + [xx, xy, yy, xz, yz, zz]])

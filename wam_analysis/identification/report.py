@@ -11,14 +11,15 @@ from wam_analysis.thresholds import IDENTIFY
 from wam_description.arm import Shared
 
 UNITS = {
-    "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
-    "moment": "kg m", "torque": "",
+    "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "stribeck": "rad/s", "inertia": "kg m^2",
+    "mass": "kg", "moment": "kg m", "torque": "",
 }  # fmt: skip
-STATIC = "motors.static_"
+CURVE = ("motors.static_", "motors.stribeck_")
 BY_SHAPE = "by the curve"
 NOTES = f"""'In combination': identified only together with other parameters.
-'{BY_SHAPE}': static friction is the value of the fitted friction curve at rest, with the error of that curve. Stiction
-that acts only below {IDENTIFY.slowest_motor:g} rad/s of a motor is not in it; `wam analyse` shows breakaway torques.
+'{BY_SHAPE}': static friction is the value of the fitted friction curve at rest, the Stribeck velocity where it drops,
+each with the error of that curve. Stiction that acts only below {IDENTIFY.slowest_motor:g} rad/s of a motor is not in
+it; `wam analyse` shows breakaway torques.
 The inertia of a rotor may be wrong by a quarter of it, which is within two of its standard errors: see
 docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
@@ -42,7 +43,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     for i, name in enumerate(result.names):
         unit = UNITS[name.split(".")[1].partition("_")[0]]
         state = "yes" if is_identified[i] else "in combination" if is_combined[i] else "no"
-        state = BY_SHAPE if state == "yes" and name.startswith(STATIC) else state
+        state = BY_SHAPE if state == "yes" and name.startswith(CURVE) else state
         cells = [f"{value:.4g}" for value in (result.values[i], result.sd[i], result.present[i])]
         rows.append([name, *cells, unit, state])
     offset, offset_sd = found.offset_if_alike

@@ -90,6 +90,7 @@ def unknowns(shared: Shared) -> Unknowns:
     for way in DIRECTIONS:
         load = np.array(getattr(motors, f"load_{way}"))
         add(f"motors.load_{way}", every, load + (lumped.T > 0.0) @ at_joints.load, IDENTIFY.load)
+    add("motors.stribeck_velocity", every, np.array(motors.stribeck_velocity), IDENTIFY.stribeck)
     viscous = np.array(motors.viscous) + (lumped**2).T @ at_joints.viscous
     add("motors.viscous", every, viscous, IDENTIFY.viscous * viscous)
     add("motors.inertia", every, np.array(motors.inertia), IDENTIFY.rotor * np.array(motors.inertia))

@@ -168,9 +168,8 @@ def _information(shared: Shared, points: MovePoints) -> Array:
     torque = joints @ np.linalg.inv(inverse)
     motion = MotionSamples(points.time, theta, thetad, thetadd, torque, thetad[:, None], torque[:, None], np.ones(1))
     sought = unknowns(shared)
-    equations = Regressor(shared, sought, motion, np.array(shared.model.motors.stribeck_velocity)).equations(
-        sought.present
-    )
+    equations = Regressor(shared, sought, motion).equations(sought.present)
+    equations.columns[..., sought.places("motors.stribeck_velocity")] = 0.0  # no move is chosen for it
     rows = equations.columns[equations.is_used]
     found: Array = rows.T @ rows / MOVES.torque_sd**2
     return found

@@ -87,7 +87,7 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
     shared = configuration.shared
     found = identify(shared, samples)
     truth = true_friction(configuration)
-    regressor = Regressor(shared, found.unknowns, samples, found.stribeck_velocity)
+    regressor = Regressor(shared, found.unknowns, samples)
     # of each motor at each state, (k, n), N m, without and with the friction of own joints
     links, cables = (each.reshape(-1, each.shape[2]) for each in regressor.loads(found.values))
     errors: dict[str, list[Array]] = {name: [] for name in ("level", "level_sd", "coulomb", "coulomb_sd", "before")}
