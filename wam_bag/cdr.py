@@ -72,8 +72,11 @@ class Reading:
 
     Attributes
     ----------
+    numbers_at : numbers and arrays of them, by path: '.header.stamp.sec', '.position', '.markers[0].scale.x'.
     counts_at : place and value of every count in the message, of characters, numbers or messages.
+    texts_at : first byte and end of every string.
     end : bytes that were read.
+    message : their values, where a `Decoder` read them.
     """
 
     def __init__(self, data: bytes, is_packed: bool = False) -> None:
@@ -84,8 +87,11 @@ class Reading:
         except KeyError:
             raise Damage(f"a message has the encapsulation {data[:2].hex() or 'none'}; plain CDR is read") from None
         self.data = data
+        self.numbers_at: dict[str, Leaf] = {}
         self.counts_at: list[tuple[int, int]] = []
+        self.texts_at: list[tuple[int, int]] = []
         self.end = ENCAPSULATION
+        self.message: Any = None
 
     def skip(self, size: int) -> int:
         """Pass over some bytes; returns the first."""
@@ -95,16 +101,18 @@ class Reading:
             raise Damage("a message ends early")
         return start
 
-    def numbers(self, kind: str, count: int) -> tuple[int, np.dtype[Any]]:
-        """Pass over numbers; their first byte and type."""
-        dtype = number_type(self.order, kind)
-        if count and not self._is_packed:
+    def numbers(self, kind: str, count: int | None, path: str = "") -> tuple[int, np.dtype[Any]]:
+        """Pass over an array of numbers, or one without a count; their first byte and type."""
+        dtype, number = number_type(self.order, kind), 1 if count is None else count
+        if number and not self._is_packed:
             self.end += -(self.end - ENCAPSULATION) % dtype.itemsize
-        return self.skip(dtype.itemsize * count), dtype
+        start = self.skip(dtype.itemsize * number)
+        self.numbers_at[path] = Leaf(start - ENCAPSULATION, dtype, count)
+        return start, dtype
 
     def count(self) -> int:
         """The count of what follows."""
-        start, _ = self.numbers("uint32", 1)
+        start, _ = self.numbers("uint32", None)
         (count,) = struct.unpack_from(self.order + "I", self.data, start)
         self.counts_at.append((start, count))
         return int(count)
@@ -112,6 +120,7 @@ class Reading:
     def text(self) -> str:
         """A string without its terminator; bytes that are not UTF-8 are written with backslashes."""
         start = self.skip(self.count())
+        self.texts_at.append((start, self.end))
         text = self.data[start : self.end]
         return (text if self._is_packed else text[:-1]).decode("utf-8", "backslashreplace")
 
@@ -120,64 +129,6 @@ class Reading:
 def number_type(order: str, kind: str) -> np.dtype[Any]:
     """Type of a primitive in this byte order."""
     return np.dtype(order + PRIMITIVES[kind])
-
-
-class Layout(Reading):
-    """The place of everything in messages that have the same counts and strings as this one.
-
-    Parameters
-    ----------
-    kind : ``package/msg/Type``.
-    definitions : fields of it and of the types it consists of.
-    data : a message of this type, with its encapsulation.
-
-    Attributes
-    ----------
-    numbers_at : numbers and arrays of them, by path: 'header.stamp.sec', 'position', 'markers[0].scale.x'.
-    texts : strings and arrays of them, by path.
-    counts : length of each sequence of messages, by path.
-    fixed : for each byte of the message whether it decides the layout: byte order, counts, strings.
-    """
-
-    def __init__(self, kind: str, definitions: Definitions, data: bytes) -> None:
-        super().__init__(data)
-        self.numbers_at: dict[str, Leaf] = {}
-        self.texts: dict[str, tuple[str, ...]] = {}
-        self.counts: dict[str, int] = {}
-        self.fixed = np.zeros(len(data), np.bool_)
-        self.fixed[:2] = True
-        self._definitions = definitions
-        self._message(kind, "")
-        for start, _ in self.counts_at:
-            self.fixed[start : start + 4] = True
-
-    def _message(self, kind: str, path: str) -> None:
-        fields = self._definitions[kind]
-        for name, inner, length in fields:
-            self._field(f"{path}.{name}" if path else name, inner, length)
-        if not fields:
-            self.skip(1)
-
-    def _field(self, path: str, kind: str, length: int | None) -> None:
-        count = length or (1 if length is None else self.count())
-        if kind == "string":
-            self.texts[path] = tuple(self.text() for _ in range(count))
-        elif kind in PRIMITIVES:
-            start, dtype = self.numbers(kind, count)
-            self.numbers_at[path] = Leaf(start - ENCAPSULATION, dtype, None if length is None else count)
-        elif length is None:
-            self._message(kind, path)
-        else:
-            self.counts[path] = count
-            for i in range(count):
-                self._message(kind, f"{path}[{i}]")
-
-    def text(self) -> str:
-        """A string, whose bytes decide the layout."""
-        text = super().text()
-        start, count = self.counts_at[-1]
-        self.fixed[start + 4 : start + 4 + count] = True
-        return text
 
 
 class Decoder:
@@ -195,29 +146,45 @@ class Decoder:
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
-        return self._value(Reading(data, self._is_packed), self._kind, None)
+        return self.read(data).message
 
-    def _value(self, reading: Reading, kind: str, length: int | None) -> Any:
+    def read(self, data: bytes) -> Reading:
+        """The message, and where its parts are."""
+        reading = Reading(data, self._is_packed)
+        reading.message = self._value(reading, "", self._kind, None)
+        return reading
+
+    def _value(self, reading: Reading, path: str, kind: str, length: int | None) -> Any:
         if length is not None:
             count = length or reading.count()
             if kind not in PRIMITIVES:
-                return [self._value(reading, kind, None) for _ in range(count)]
-            start, dtype = reading.numbers(kind, count)
+                return [self._value(reading, f"{path}[{i}]", kind, None) for i in range(count)]
+            start, dtype = reading.numbers(kind, count, path)
             return np.frombuffer(reading.data, dtype, count, start)
         if kind == "string":
             return reading.text()
         if kind in PRIMITIVES:
-            start, _ = reading.numbers(kind, 1)
+            start, _ = reading.numbers(kind, None, path)
             (value,) = struct.unpack_from(reading.order + PRIMITIVES[kind], reading.data, start)
             return value != 0 if kind == "bool" else value
         fields = self._definitions[kind]
-        values = [self._value(reading, *field[1:]) for field in fields]
+        values = [self._value(reading, f"{path}.{name}", inner, size) for name, inner, size in fields]
         if not fields and not self._is_packed:
             reading.skip(1)
         if kind not in self._classes:
-            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
-            self._classes[kind] = namedtuple(kind.rpartition("/")[2], names)
+            self._classes[kind] = _class(kind.rpartition("/")[2], tuple(name for name, _, _ in fields))
         return self._classes[kind](*values)
+
+
+@cache
+def _class(kind: str, names: tuple[str, ...]) -> Any:
+    """That of messages with these fields."""
+    return namedtuple(kind, [name + "_" * keyword.iskeyword(name) for name in names])
+
+
+def _decoder(kind: str) -> Decoder:
+    """That of a type that the stack publishes."""
+    return Decoder(kind, CDR, definitions(kind, schema(kind)))
 
 
 def from_json(data: bytes) -> Any:
@@ -288,10 +255,10 @@ class Pattern:
     def __init__(self, kind: str, value: Sequence[Any], table: str = "") -> None:
         data = encoded(kind, value)
         spans: list[tuple[int, int]] = []  # of the groups
-        for path, (offset, dtype, length) in Layout(kind, definitions(kind, schema(kind)), data).numbers_at.items():
+        for path, (offset, dtype, length) in _decoder(kind).read(data).numbers_at.items():
             begin = ENCAPSULATION + offset
             end = begin + dtype.itemsize * (1 if length is None else length)
-            if path != table and dtype.str != "<f8":
+            if path != f".{table}" and dtype.str != "<f8":
                 continue
             if length is None and spans and begin == spans[-1][1]:
                 begin, _ = spans.pop()
@@ -361,8 +328,7 @@ class ExactLength:
     """
 
     def __init__(self, name: str) -> None:
-        self._name = name
-        self._definitions = definitions(name, schema(name))
+        self._decoder = _decoder(name)
         self._known = struct.Struct("")
         self._counts: tuple[int, ...] | None = None
         self._length = 0
@@ -372,19 +338,19 @@ class ExactLength:
         if len(data) >= self._length and self._known.unpack_from(data) == self._counts:
             return self._length
         try:
-            layout = Layout(self._name, self._definitions, data)
+            found = self._decoder.read(data)
         except Damage:
             return len(data)
-        if len(layout.counts_at) > READING_LIMITS.counts_kept:
+        if len(found.counts_at) > READING_LIMITS.counts_kept:
             self._counts = None
         else:
-            self._keep(layout)
-        return layout.end
+            self._keep(found)
+        return found.end
 
-    def _keep(self, layout: Layout) -> None:
-        form, position, counts = layout.order + "xB", 2, [layout.data[1]]
-        for offset, count in layout.counts_at:
+    def _keep(self, found: Reading) -> None:
+        form, position, counts = found.order + "xB", 2, [found.data[1]]
+        for offset, count in found.counts_at:
             form += f"{offset - position}xI"
             position = offset + 4
             counts.append(count)
-        self._known, self._counts, self._length = struct.Struct(form), tuple(counts), layout.end
+        self._known, self._counts, self._length = struct.Struct(form), tuple(counts), found.end

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.arrays import Index, Mask, Numbers, Texts, Times
-from wam_bag.cdr import CDR, MessageType
+from wam_bag.cdr import CDR, Decoder, MessageType
 from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
 from wam_bag.message_groups import Decoded, Group, Grouping
@@ -146,7 +146,7 @@ class Collector:
         self.kind = kind
         self._columned = _TYPES.get(kind.name) if kind.encoding == CDR and not as_messages else None
         self._times: list[Times] = []
-        self._groups_of = Grouping(kind.name, kind.definitions)
+        self._groups_of = Grouping(Decoder(*kind))
         self._groups: list[tuple[Index, Any]] = []
         self._data: list[bytes] = []
         self._number = 0
@@ -182,7 +182,7 @@ class Collector:
 
 
 def _header(group: Group) -> tuple[Times, str]:
-    return group.time("header.stamp"), group.text("header.frame_id")[0]
+    return group.time("header.stamp"), group.text("header.frame_id")
 
 
 def _where(rows: Index) -> slice | Index:
@@ -288,7 +288,7 @@ def _table_columns(times: Times, groups: list[Any]) -> TableColumns:
 
 _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
     "sensor_msgs/msg/JointState": (
-        lambda group: (*_header(group), group.text("name"), list(map(group.numbers, JOINT_FIELDS))),
+        lambda group: (*_header(group), tuple(group.text("name")), list(map(group.numbers, JOINT_FIELDS))),
         joint_columns,
     ),
     "geometry_msgs/msg/WrenchStamped": _vectors(WrenchColumns, "wrench.force", "wrench.torque"),

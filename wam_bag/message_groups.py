@@ -1,13 +1,14 @@
 """Messages of one layout decoded together: their numbers as columns; others as objects."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Final, NamedTuple, overload
+from operator import attrgetter
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.arrays import Bytes, Index, Mask, Numbers, Rows, Times
-from wam_bag.cdr import ENCAPSULATION, Definitions, Layout
+from wam_bag.cdr import ENCAPSULATION, Decoder, Reading
 from wam_bag.errors import BagError, Damage
 from wam_bag.limits import READING_LIMITS
 from wam_bag.message_search import at
@@ -21,24 +22,24 @@ class Group(NamedTuple):
     """Messages of one layout: which of all they are, and their bytes, one row each."""
 
     rows: Index
-    layout: Layout
+    layout: Reading
     words: Words
 
     def numbers(self, path: str) -> NDArray[Any]:
         """Numbers of each message at a path, (m, n)."""
         try:
-            leaf = self.layout.numbers_at[path]
+            leaf = self.layout.numbers_at[f".{path}"]
         except KeyError:
             raise Damage(f"its type has no numbers '{path}'") from None
         size = leaf.dtype.itemsize * (1 if leaf.length is None else leaf.length)
         begin = 8 + leaf.offset
         return self.words.view(np.uint8)[:, begin : begin + size].view(leaf.dtype)
 
-    def text(self, path: str) -> tuple[str, ...]:
-        """Strings at a path."""
+    def text(self, path: str) -> Any:
+        """String or strings at a path."""
         try:
-            return self.layout.texts[path]
-        except KeyError:
+            return attrgetter(path)(self.layout.message)
+        except AttributeError:
             raise Damage(f"its type has no strings '{path}'") from None
 
     def time(self, path: str) -> Times:
@@ -55,17 +56,18 @@ class Known(NamedTuple):
     """A layout and how its messages are recognised: the bits of their words that must be equal, and their values."""
 
     size: int
-    layout: Layout
+    layout: Reading
     mask: Words
     want: Words
 
     @staticmethod
-    def of(layout: Layout) -> "Known":
-        """What the messages of this layout have in common."""
-        size = len(layout.fixed)
+    def of(layout: Reading) -> "Known":
+        """What the messages of this layout have in common: byte order, counts and strings."""
+        size = len(layout.data)
         width = 8 * _words(size)
         mask, want = np.zeros(width, np.uint8), np.zeros(width, np.uint8)
-        mask[BEFORE : BEFORE + size][layout.fixed] = 255
+        for start, end in ((0, 2), *((place, place + 4) for place, _ in layout.counts_at), *layout.texts_at):
+            mask[BEFORE + start : BEFORE + end] = 255
         want[BEFORE : BEFORE + size] = np.frombuffer(layout.data, np.uint8)
         return Known(size, layout, mask.view(np.uint64), (want & mask).view(np.uint64))
 
@@ -79,12 +81,11 @@ class Grouping:
 
     Parameters
     ----------
-    kind : ``package/msg/Type``.
-    definitions : fields of it and of the types it consists of.
+    decoder : of this type.
     """
 
-    def __init__(self, kind: str, definitions: Definitions) -> None:
-        self._kind, self._definitions = kind, definitions
+    def __init__(self, decoder: Decoder) -> None:
+        self._decoder = decoder
         self._known: list[Known] = []
 
     def __call__(self, buffer: Bytes, starts: Rows, sizes: Rows) -> Iterator[Group]:
@@ -97,7 +98,7 @@ class Grouping:
                 known = next(tried, None)
                 if known is None:
                     first = int(starts[rows[0]])
-                    known = Known.of(Layout(self._kind, self._definitions, buffer[first : first + size].tobytes()))
+                    known = Known.of(self._decoder.read(buffer[first : first + size].tobytes()))
                     if len(self._known) < READING_LIMITS.layouts:
                         self._known.append(known)
                 fits = known.fits(words)
@@ -126,11 +127,7 @@ class Decoded(Sequence[Any]):
     def __len__(self) -> int:
         return len(self._data)
 
-    @overload
-    def __getitem__(self, index: int) -> Any: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Any]: ...
-    def __getitem__(self, index: int | slice) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         if self._made is None:
             try:
                 self._made = [self._decode(data) for data in self._data]

@@ -29,9 +29,8 @@ def tables(group: Group) -> list[PointTable]:
     Damage
         if the sizes in a message do not fit each other or its data.
     """
-    count = group.layout.counts["fields"]
-    names = [group.text(f"fields[{i}].name")[0] for i in range(count)]
-    paths = [*_SIZES, *(f"fields[{i}].{part}" for i in range(count) for part in ("offset", "datatype", "count"))]
+    names = [field.name for field in group.text("fields")]
+    paths = [*_SIZES, *(f"fields[{i}].{part}" for i in range(len(names)) for part in ("offset", "datatype", "count"))]
     described = np.hstack([group.numbers(path).astype(np.int64) for path in paths])
     data = group.numbers("data")
     found = []
