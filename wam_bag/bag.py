@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
+from mcap.opcode import Opcode
 from mcap.records import Channel
 
 from wam_bag import safe_yaml
@@ -181,11 +182,11 @@ def read(
                 types.setdefault(channel.topic, kind)
                 if is_selected(channel.topic, topics):
                     take(channel)
-            for item in file.attachments():
+            for item in file.records(Opcode.ATTACHMENT):
                 before = attachments.get(item.name) if item.name == PARAMETERS else None
                 attachments[item.name] = item.data if before is None else with_nodes_of(before, item.data)
-            for name, values in file.metadata().items():
-                metadata.setdefault(name, {}).update(values)
+            for item in file.records(Opcode.METADATA):
+                metadata.setdefault(item.name, {}).update(item.metadata)
     if not may_lack:
         _require(path, topics, types)
     columns = _Topics({t: one.columns(f"{path}, topic {t}") for t, one in sorted(collectors.items())})

@@ -12,12 +12,12 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Message, Schema, Statistics
+from mcap.records import Channel, Message, Schema, Statistics
 
 from wam_bag.errors import Damage, NotClosedError, TooLargeError
 from wam_bag.limits import READING_LIMITS
@@ -28,16 +28,16 @@ from wam_bag.mcap_records import (
     HEAD,
     LARGEST_ATTACHMENT,
     MAGIC,
+    MESSAGE,
     ChunkPlace,
     RecordExtent,
     checked,
     chunk_index,
     decompress,
-    message,
     parsed,
     walk,
 )
-from wam_bag.message_search import DATA, NEVER, TAIL, MessageBatch, find
+from wam_bag.message_search import NEVER, TAIL, MessageBatch, find
 
 BATCH: Final = 16 * 2**20  # bytes that are decoded together
 _DATA_END: Final = HEAD.pack(Opcode.DATA_END, 4)  # head of the record that ends the data
@@ -96,13 +96,9 @@ class BagFile:
     def check_all(self) -> None:
         """Compare the checksum of all data with the one at their end, if there is one."""
 
-    def attachments(self) -> list[Attachment]:
-        """The attachments in the order of the file."""
+    def records(self, opcode: Opcode) -> list[Any]:
+        """Its attachments, or its metadata records, in the order of the file."""
         return []
-
-    def metadata(self) -> dict[str, dict[str, str]]:
-        """Metadata records by name; the entries of several of one name are put together, as those of merged bags."""
-        return {}
 
     def batches(
         self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
@@ -210,11 +206,14 @@ class McapFile(BagFile):
         return self._data[record.start + HEAD.size : record.end]
 
     def messages(self, record: RecordExtent) -> list[Message]:
-        """The messages of a chunk record, checked, in their order; its indexes are not needed."""
-        place = self._chunk_at(record)
+        """The messages of a chunk, or that of a message record, checked, in their order; no indexes are needed."""
+        place = self._chunk_at(record) if record.opcode == Opcode.CHUNK else _loose(record.start, record.end)
         batch = self._load([place], place.size)
-        found = zip((batch.offsets + HEAD.size).tolist(), (batch.offsets + DATA + batch.sizes).tolist(), strict=True)
-        return [message(batch.buffer[start:end].tobytes()) for start, end in found]
+        heads = [MESSAGE.unpack_from(batch.buffer.data, offset) for offset in batch.offsets.tolist()]
+        return [
+            Message(channel, log_time, data, publish_time, sequence)
+            for (_, _, channel, sequence, log_time, publish_time), data in zip(heads, batch.messages(), strict=True)
+        ]
 
     def check_all(self) -> None:
         """Compare the checksum of all data with the one at their end, if there is one."""
@@ -225,24 +224,16 @@ class McapFile(BagFile):
         if crc != self._data_crc:
             raise Damage("its data do not match their checksum")
 
-    def attachments(self) -> list[Attachment]:
-        """The attachments in the order of the file."""
-        records = [one for one in self._others if one.opcode == Opcode.ATTACHMENT]
-        for _, start, end in records:
+    def records(self, opcode: Opcode) -> list[Any]:
+        """See `BagFile.records`."""
+        found = [one for one in self._others if one.opcode == opcode]
+        for _, start, end in found:
             if end - start > LARGEST_ATTACHMENT:
                 raise TooLargeError(
-                    f"the attachment at byte {start} has {end - start} bytes; at most {LARGEST_ATTACHMENT} are read"
+                    f"the {opcode.name.lower()} at byte {start} has {end - start} bytes; at most {LARGEST_ATTACHMENT} "
+                    "are read"
                 )
-        return [parsed(Opcode.ATTACHMENT, self.content(record)) for record in records]
-
-    def metadata(self) -> dict[str, dict[str, str]]:
-        """Metadata records by name; the entries of several of one name are put together, as those of merged bags."""
-        found: dict[str, dict[str, str]] = {}
-        for record in self._others:
-            if record.opcode == Opcode.METADATA:
-                one = parsed(Opcode.METADATA, self.content(record))
-                found.setdefault(one.name, {}).update(one.metadata)
-        return found
+        return [parsed(opcode, self.content(record)) for record in found]
 
     def batches(
         self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
@@ -326,9 +317,7 @@ class McapFile(BagFile):
                 begin, last = record.start, self._blocks[-1] if self._blocks else None
                 if last and last.is_loose and last.end == begin and record.end - last.start <= BATCH:
                     begin = self._blocks.pop().start
-                size = record.end - begin
-                place = ChunkPlace(begin, record.end, record.end, 0, NEVER, size, frozenset(), is_loose=True)
-                self._blocks.append(place)
+                self._blocks.append(_loose(begin, record.end))
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self.define(opcode, self.content(record))
             elif opcode == Opcode.CHUNK:
@@ -357,3 +346,8 @@ class McapFile(BagFile):
             parts.append(find(part, index, self.define, position))
             position += len(part)
         return MessageBatch(buffer, *np.concatenate(parts, axis=1))
+
+
+def _loose(start: int, end: int) -> ChunkPlace:
+    """Message records outside chunks."""
+    return ChunkPlace(start, end, end, 0, NEVER, end - start, frozenset(), is_loose=True)

@@ -62,11 +62,6 @@ def parsed(opcode: int, content: bytes) -> Any:
     return _CLASSES[opcode].read(_Content(BytesIO(content)))
 
 
-def message(content: bytes) -> records.Message:
-    """A message record."""
-    return records.Message.read(_Content(BytesIO(content)), len(content))
-
-
 def serialized(record: records.McapRecord) -> bytes:
     """A record as it is written to a file."""
     builder = RecordBuilder()

@@ -100,11 +100,7 @@ def _indexed(part: Bytes, index: bytes) -> Rows:
 
 def packed(messages: Sequence[tuple[int, int, bytes]]) -> MessageBatch:
     """A batch of messages: channel id, log time, ns, and data of each."""
-    parts = [
-        part
-        for channel, time, data in messages
-        for part in (MESSAGE.pack(Opcode.MESSAGE, DATA - HEAD.size + len(data), channel, 0, time, time), data)
-    ]
+    parts = [bytes(DATA) + data for *_, data in messages]  # without heads, which nobody reads
     sizes = np.array([len(data) for *_, data in messages], np.int64)
     channels, times = np.array([one[:2] for one in messages], np.int64).reshape(-1, 2).T
     buffer = np.frombuffer(b"".join([*parts, bytes(TAIL)]), np.uint8)

@@ -14,7 +14,7 @@ from wam_bag.bag_writer import CHUNK_SIZE, release
 from wam_bag.errors import BROKEN, BagError, Damage, TooLargeError
 from wam_bag.losses import REPAIRED, FileLosses, Hole
 from wam_bag.mcap_file import McapFile, MessageCounts
-from wam_bag.mcap_records import RecordExtent, message, parsed
+from wam_bag.mcap_records import RecordExtent, parsed
 from wam_bag.mcap_writer import McapWriter
 from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
 
@@ -155,11 +155,10 @@ class _Copy:
 
     def _copy(self, record: RecordExtent) -> None:
         file, writer, opcode = self._file, self._writer, record.opcode
-        if opcode == Opcode.CHUNK:
+        if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
             self._add(file.messages(record))
-            writer.flush()  # a chunk stays one
-        elif opcode == Opcode.MESSAGE:
-            self._add([message(file.content(record))])
+            if opcode == Opcode.CHUNK:
+                writer.flush()  # a chunk stays one
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             file.define(opcode, file.content(record))
         elif opcode == Opcode.ATTACHMENT:
