@@ -38,7 +38,7 @@ from wam_description.reasons import Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
-from wam_sim.reactions import RecordedReaction, sentences
+from wam_sim.reactions import RecordedReaction, in_words
 from wam_sim.recorded_parameters import recorded_parameters
 from wam_sim.recorded_run import recorded_run
 from wam_sim.simulated_bag import record
@@ -579,7 +579,7 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
         clock + START + 7000 * MS,
         Event(Code.REFUSED, values={"reason": "why", "holds": 1.0}),
     )
-    assert sentences("press", [reaction], traces.zero) == ["press: refused from 5.00 to 7.00 s: why"]
+    assert in_words("press", [reaction], traces.zero) == [("press: refused from 5.00 to 7.00 s", "why")]
 
 
 def test_what_is_reported_briefly_during_a_force_has_its_name():
