@@ -5,6 +5,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
+from operator import add, sub
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -78,7 +79,7 @@ class MomentumObserver:
             len(parameters.mass_scale) == n,
             f"parameter 'observer.mass_scale' has {len(parameters.mass_scale)} values; {n} links need {n}",
         )
-        self._n, self._parameters, self._none = n, parameters, np.zeros(n)
+        self._n, self._parameters = n, parameters
         self.body = RigidBody(arm, parameters.mass_scale)
         self._side = side = MotorSide(arm, parameters, cycle > 0, model)
         self._is_link_side = use_joint_sensors
@@ -101,9 +102,9 @@ class MomentumObserver:
 
     def reset(self) -> None:
         """Forget all samples."""
-        none = self._none
+        n = self._n
         self._filters.reset()
-        self._last = _Sample(none.tolist(), none, none, np.diag(none), none, none, None)
+        self._last = _Sample([0.0] * n, [0.0] * n, [], np.zeros((n, n)), [], [], None)
         self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
@@ -138,47 +139,55 @@ class MomentumObserver:
             False if the sample is refused: a wrong length, a value that is not finite, dt <= 0.
             The observer stays as it was; the next good sample covers the gap.
         """
+        n = self._n
         if not (0.0 < dt < math.inf):
             return False
         position, velocity, effort = state
-        finite = math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
-        if not len(position) == len(velocity) == len(effort) == self._n or not finite:
+        # of joint sensors, what follows from the sample is finite only if the sample is
+        finite = self._is_link_side or math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
+        if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
-        span = dt + self._gap
         if self._is_link_side:
-            return self._update(position, velocity, effort, self._none, NO_SIGNALS, span)
+            return self._update(position, velocity, effort, [], NO_SIGNALS, dt)
         if self._side.carries_nothing(state):
             self.reset()
             return True
-        sample = self._side.take(state, span)
+        sample = self._side.take(state, dt + self._gap)
         self._gap = 0.0
         return sample is None or self._update(*sample)
 
     def _update(
-        self, q: list[float], qd: list[float], tau: list[float], friction: Array, signals: Array, span: float
+        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, dt: float
     ) -> bool:
         """Take a sample of the joints, see `JointSample`."""
         body, at, speed, last = self.body, np.array(q), np.array(qd), self._last
-        inertia, links = body.mass_matrix(at), None
-        momentum = inertia.dot(speed)
-        if not self._is_link_side:
+        span, inertia, links = dt + self._gap, body.mass_matrix(at), None
+        if self._is_link_side:
+            momentum = inertia.dot(speed).tolist()
+        else:
             rotors, driven = self._side.rotors, inertia + self._side.pulleys
             links = self._side.links(driven, speed, last.links, span)
-            momentum = links.momentum + rotors.dot(speed)
-            inertia, speed = driven + rotors, links.velocity
-        bias = body.momentum_bias(at, speed)
-        external, model, acceleration = self._none, -bias, self._none
+            momentum = (links.momentum + rotors.dot(speed)).tolist()
+            inertia, speed, qd = driven + rotors, links.velocity, links.velocity.tolist()
+        bias = body.momentum_bias(at, speed).tolist()
+        external, model, before = [0.0] * self._n, [-torque for torque in bias], qd
         if self._filters.count:
-            model = (momentum - last.momentum) / span - 0.5 * (bias + last.bias)
-            external = model - np.array(tau) + 0.5 * (friction + last.friction)
-            acceleration = (speed - last.qd) / span
-        present = np.concatenate((external, model, at, speed, acceleration, signals))
-        if not math.isfinite(float(momentum.sum() + present.sum())):
-            self._gap = span
+            before = last.qd
+            changes, meant = map(sub, momentum, last.momentum), map(add, bias, last.bias)
+            model = [change / span - 0.5 * twice for change, twice in zip(changes, meant)]  # noqa: B905
+            external = list(map(sub, model, tau))
+            if friction:
+                resisted = map(add, friction, last.friction)
+                external = [each + 0.5 * twice for each, twice in zip(external, resisted)]  # noqa: B905
+        present = [*external, *model, *q]
+        if not math.isfinite(sum(momentum, sum(present))):
+            self._gap += dt
             return False
-        self._filters.take(present, span)
-        self._last, self._gap = _Sample(q, speed, momentum, inertia, bias, friction, links), 0.0
+        if friction:
+            present += [*qd, *(change / span for change in map(sub, qd, before))]
+        self._filters.take(present, signals, span)
+        self._last, self._gap = _Sample(q, qd, momentum, inertia, bias, friction, links), 0.0
         self.age += span
         return True
 
@@ -242,7 +251,7 @@ class MomentumObserver:
             )
         if not self.is_ready:
             return "too few samples so far; try again"
-        if np.abs(self._last.qd).max() > CONTACT.at_rest:
+        if max(map(abs, self._last.qd)) > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
         self._errors.zero(self.seen, detect)
@@ -255,25 +264,26 @@ class _Sample(NamedTuple):
     Attributes
     ----------
     q, qd : of the joints, (n,), rad, rad/s.
-    momentum : (n,), N m s.
+    momentum : (n,), N m s; before the first sample it is empty, as what follows but the inertia.
     inertia : (n, n), kg m^2.
-    bias, friction : torques of the model, (n,), N m; no friction with joint sensors.
+    bias, friction : torques of the model, (n,), N m; friction is empty with joint sensors.
     links : as the motors drive them; None with joint sensors, and before the first sample.
     """
 
     q: list[float]
-    qd: Array
-    momentum: Array
+    qd: list[float]
+    momentum: list[float]
     inertia: Array
-    bias: Array
-    friction: Array
+    bias: list[float]
+    friction: list[float]
     links: LinkMotion | None
 
 
 class _Filters:
     """First-order filters of what a sample shows, and its mean over a cycle of a dither.
 
-    Each number is filtered with every time constant, in the order of `FilteredMotion`.
+    Each number is filtered with every time constant, in the order of `FilteredMotion`: torques and motion in lists,
+    the signals of the shafts, which are many, in arrays.
 
     Parameters
     ----------
@@ -289,27 +299,33 @@ class _Filters:
 
     def __init__(self, n: int, signals: int, times: Sequence[float], cycle: int) -> None:
         self.times, self.cycle, self._n = times, cycle, n
-        self._empty, self._ring = np.zeros((len(times), 5 * n + signals)), np.zeros((cycle, 5 * n + signals))
+        self._ring = np.zeros((cycle, 5 * n + signals))
+        self._empty = [[0.0] * (5 * n) for _ in times], [np.zeros(signals) for _ in times]
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._values, self.count = self._empty, 0
+        (self._values, self._signals), self.count = self._empty, 0
 
-    def take(self, present: Array, span: float) -> None:
+    def take(self, present: list[float], signals: Array, span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
-        keep = np.array([[math.exp(-span / time) if self.count else 0.0] for time in self.times])
-        found = keep * self._values + (1.0 - keep) * present
-        if self.count and span > self.times[0]:
-            found[:, : 5 * self._n] = self._values[:, : 5 * self._n]
-        self._values = found  # replaced, never changed: others may keep it
+        keeps = [math.exp(-span / time) if self.count else 0.0 for time in self.times]
+        if not self.count or span <= self.times[0]:
+            # in lists: they take half the time of arrays
+            self._values = [
+                [keep * before + (1.0 - keep) * now for before, now in zip(old, present)]  # noqa: B905
+                for old, keep in zip(self._values, keeps, strict=True)
+            ]
+        if len(signals):
+            each = zip(self._signals, keeps, strict=True)
+            self._signals = [keep * old + (1.0 - keep) * signals for old, keep in each]
         if self.cycle:
-            self._ring[self.count % self.cycle] = found[0]
+            self._ring[self.count % self.cycle] = np.concatenate((self._values[0], self._signals[0]))
         self.count += 1
 
     def motion(self, which: int) -> FilteredMotion:
         """What was filtered with one time constant; the torque of the model without the mean over a cycle."""
-        n, filtered = self._n, self._values[which]
+        n, filtered = self._n, np.concatenate((self._values[which], self._signals[which]))
         mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
-        residual, _, pose, velocity, acceleration = mean[: 5 * n].reshape(5, n)
-        return FilteredMotion(residual, filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])
+        pose, velocity, acceleration = mean[2 * n : 3 * n], mean[3 * n : 4 * n], mean[4 * n : 5 * n]
+        return FilteredMotion(mean[:n], filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])

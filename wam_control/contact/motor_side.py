@@ -22,15 +22,15 @@ Array = NDArray[np.float64]
 class JointSample(NamedTuple):
     """State of the joints and torque of the motors at them, (n,); friction, (n,), N m, and signals of the shafts.
 
-    On the link side, behind the friction, there is none, and `signals` are empty; `span` in s since the one before.
+    `friction` and `signals` are empty on the link side, which lies behind the friction; `dt` in s since the one before.
     """
 
     q: list[float]
     qd: list[float]
     tau: list[float]
-    friction: Array
+    friction: list[float]
     signals: Array
-    span: float
+    dt: float
 
 
 class LinkMotion(NamedTuple):
@@ -108,7 +108,7 @@ class MotorSide:
         motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)
         at_shafts: list[float] = motion.friction.tolist()
         through = self.map.joint_torques(at_shafts[:n])
-        friction = np.array(through) + motion.friction[n:]
+        friction = [a + b for a, b in zip(through, at_shafts[n:], strict=True)]
         tau = self.map.joint_torques(tau_motor)
         transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*at_shafts[:n], *through], strict=True)]
         torque = np.array(tau_motor)
