@@ -72,11 +72,11 @@ class Reading:
 
     Attributes
     ----------
-    numbers_at : numbers and arrays of them, by path: '.header.stamp.sec', '.position', '.markers[0].scale.x'.
+    numbers_at : numbers and arrays of them that have a path: '.header.stamp.sec', '.position', '.markers[0].scale.x'.
     counts_at : place and value of every count in the message, of characters, numbers or messages.
     texts_at : first byte and end of every string.
     end : bytes that were read.
-    message : their values, where a `Decoder` read them.
+    message : their values, where `Decoder.read` read them.
     """
 
     def __init__(self, data: bytes, is_packed: bool = False) -> None:
@@ -101,13 +101,17 @@ class Reading:
             raise Damage("a message ends early")
         return start
 
-    def numbers(self, kind: str, count: int | None, path: str = "") -> tuple[int, np.dtype[Any]]:
-        """Pass over an array of numbers, or one without a count; their first byte and type."""
+    def numbers(self, kind: str, count: int | None, path: str | None = None) -> tuple[int, np.dtype[Any]]:
+        """Pass over an array of numbers, or one without a count; their first byte and type.
+
+        Their place is kept where they have a path.
+        """
         dtype, number = number_type(self.order, kind), 1 if count is None else count
         if number and not self._is_packed:
             self.end += -(self.end - ENCAPSULATION) % dtype.itemsize
         start = self.skip(dtype.itemsize * number)
-        self.numbers_at[path] = Leaf(start - ENCAPSULATION, dtype, count)
+        if path is not None:
+            self.numbers_at[path] = Leaf(start - ENCAPSULATION, dtype, count)
         return start, dtype
 
     def count(self) -> int:
@@ -146,7 +150,7 @@ class Decoder:
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
-        return self.read(data).message
+        return self._value(Reading(data, self._is_packed), None, self._kind, None)
 
     def read(self, data: bytes) -> Reading:
         """The message, and where its parts are."""
@@ -154,11 +158,13 @@ class Decoder:
         reading.message = self._value(reading, "", self._kind, None)
         return reading
 
-    def _value(self, reading: Reading, path: str, kind: str, length: int | None) -> Any:
+    def _value(self, reading: Reading, path: str | None, kind: str, length: int | None) -> Any:
+        """A value; without a path the places of its numbers are not kept."""
         if length is not None:
             count = length or reading.count()
             if kind not in PRIMITIVES:
-                return [self._value(reading, f"{path}[{i}]", kind, None) for i in range(count)]
+                each = range(count)
+                return [self._value(reading, None if path is None else f"{path}[{i}]", kind, None) for i in each]
             start, dtype = reading.numbers(kind, count, path)
             return np.frombuffer(reading.data, dtype, count, start)
         if kind == "string":
@@ -168,20 +174,18 @@ class Decoder:
             (value,) = struct.unpack_from(reading.order + PRIMITIVES[kind], reading.data, start)
             return value != 0 if kind == "bool" else value
         fields = self._definitions[kind]
-        values = [self._value(reading, f"{path}.{name}", inner, size) for name, inner, size in fields]
+        values = [
+            self._value(reading, None if path is None else f"{path}.{name}", of, size) for name, of, size in fields
+        ]
         if not fields and not self._is_packed:
             reading.skip(1)
         if kind not in self._classes:
-            self._classes[kind] = _class(kind.rpartition("/")[2], tuple(name for name, _, _ in fields))
+            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
+            self._classes[kind] = namedtuple(kind.rpartition("/")[2], names)
         return self._classes[kind](*values)
 
 
 @cache
-def _class(kind: str, names: tuple[str, ...]) -> Any:
-    """That of messages with these fields."""
-    return namedtuple(kind, [name + "_" * keyword.iskeyword(name) for name in names])
-
-
 def _decoder(kind: str) -> Decoder:
     """That of a type that the stack publishes."""
     return Decoder(kind, CDR, definitions(kind, schema(kind)))
