@@ -154,6 +154,7 @@ def twice() -> list[Case]:
         Case("a simulation that stopped", ros1, slow, expected, "the first message of each is used"),
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
         Case("relayed", by_mcap_ros2, sent + relayed, expected, "3000 of 6000 messages repeat the one before"),
+        Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
         Case("less of a part", sqlite, sent + without(again[:1000], bool, "effort"), expected, "the first message of"),
     ]
 
