@@ -2,8 +2,6 @@
 
 from typing import Any, Final
 
-from wam_analysis.thresholds import LAYOUT
-
 # distinguishable with colour blindness
 COMMANDED, TRUE, MEASURED, ESTIMATED = "#222222", "#0072b2", "#009e73", "#d55e00"
 PREDICTED: Final = "#6b7280"  # by theory
@@ -37,15 +35,6 @@ STYLE: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8.0,
 }
-
-
-def widen_flat(axes: Any) -> None:
-    """Show a quantity that does not change as a line, not its rounding errors."""
-    for limits, widen in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
-        low, high = limits
-        least = max(LAYOUT.still, LAYOUT.flat * abs(low + high) / 2.0)
-        if high - low < least:
-            widen((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def channels(colour: str) -> tuple[int, int, int]:

@@ -27,6 +27,14 @@ def held_of(run: RecordedRun, topic: str) -> int:
     return STREAM.held
 
 
+def live_numbers(run: RecordedRun, node: str, name: str) -> list[tuple[int, float]]:
+    """Since when, ns, a number of a node had each value, from the start on; NaN where it was not recorded."""
+    key = f"{node}:{name}"
+    changes = [(since, values[key]) for since, values in run.live_values(node) if key in values]
+    every = [(0, run.parameters.nodes.get(node, {}).get(name)), *changes]
+    return [(since, float(value) if isinstance(value, (int, float)) else np.nan) for since, value in every]
+
+
 def held_for(stamps: Times, held: int = STREAM.held) -> int:
     """For how long a message of these is held, ns: `held`, or longer where a recording was thinned."""
     return max(held, STREAM.thinned * int(np.median(np.diff(stamps)))) if len(stamps) > STREAM.fewest else held

@@ -1,6 +1,5 @@
 """A recording: what is in a bag, prepared for the sections of an analysis; each is found where it is first used."""
 
-from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -12,12 +11,13 @@ from wam_analysis.findings.transmission import TransmissionFriction, transmissio
 from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.sources import Source, alternates, shared_parts, sources
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.held_messages import live_numbers
 from wam_analysis.holds import Hold, RecordedTask, holds_of, task_forces, tasks_of
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_analysis.traces import Traces, traces_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.arrays import Mask
-from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, WrenchColumns
+from wam_bag.bag import Bag, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import CUT
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
@@ -216,14 +216,7 @@ class AnalysedRecording:
     @property
     def unassessed(self) -> tuple[list[RecordedStep], str]:
         """The steps that are too short to be assessed, and that in words."""
-        key, first = f"{FORCE_LOOP}:{SETTLING_TIME}", None
-        with suppress(BagError):
-            first = self.run.parameters.node(FORCE_LOOP).get(SETTLING_TIME)
-        changes = [(since, values[key]) for since, values in self.run.live_values(FORCE_LOOP) if key in values]
-        settling = [  # time of the force loop, s, and since when it had each, ns; NaN where it was not recorded
-            (since, float(value) if isinstance(value, (int, float)) else np.nan)
-            for since, value in [(0, first), *changes]
-        ]
+        settling = live_numbers(self.run, FORCE_LOOP, SETTLING_TIME)
         watched = watched_times(self.tasks, without_forces=True)
         found = unassessed(self.reactions, watched, self.steps, settling)
         return found, too_short(settling, found)

@@ -269,8 +269,6 @@ class ReportLayout:
     digits: int = 6  # of a number
     arm: tuple[float, float] = (5.6, 4.2)  # inches, of the picture of the arm
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
-    still: float = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
-    flat: float = 1e-4  # of the value; a smaller range of a plot is not blown up
     pedestal: float = 0.07  # m, radius of the drawn base, which is not in the parameters
     floor: float = -1.0  # m, height of the foot of the drawn base
     metres_per_newton: float = 0.015  # length of an arrow

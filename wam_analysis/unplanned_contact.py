@@ -5,12 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import held_of, held_rows, step_at
+from wam_analysis.held_messages import held_of, held_rows, live_numbers, step_at
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import NAN, Traces
-from wam_bag.arrays import Mask, Numbers
-from wam_bag.bag import BagError
-from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_bag.arrays import Mask
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.number_text import apart
 from wam_sim.recorded_commands import COMMANDS
@@ -70,7 +68,9 @@ def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[Recorde
 
     Where no command comes, nothing is commanded; where the bag lacks messages of one, it is not known what was planned.
     """
-    is_true, allowed, lacking = traces.true.is_known, _allowed(run, traces), ", ".join(_lacking(run))
+    is_true, lacking, allowed = traces.true.is_known, ", ".join(_lacking(run)), np.full(len(traces.stamp), NAN)
+    for since, limit in live_numbers(run, FORCE_LOOP, LIMIT):
+        allowed[traces.stamp >= since] = limit
     size = np.where(is_true, traces.true.size, traces.estimated.size)
     is_free, hard = ~_planned(run, traces) & (size > 0.0), dict[str, HardContact]()
     rows = np.flatnonzero(is_free & (size > allowed))
@@ -94,20 +94,6 @@ def _lacking(run: RecordedRun) -> list[str]:
     lost = run.bag.losses.topics
     named = {one: f"{run.namespace}/{one}" for one in (COMMANDS if run.is_simulated else COMMANDS[:2])}
     return [one for one, name in named.items() if name not in run.bag.topics or name in lost]
-
-
-def _allowed(run: RecordedRun, traces: Traces) -> Numbers:
-    """The largest force that the configuration allows at each instant, (k,), N; NaN where it cannot be read."""
-    allowed = np.full(len(traces.stamp), NAN)
-    parameters = run.parameters
-    for begin, settings in [(0, {}), *run.live_values(FORCE_LOOP)]:
-        parameters = parameters.with_values(settings)
-        try:
-            limit = parameters.part(FORCE_LOOP, ForceLoopParameters).limits.contact_force
-        except BagError:
-            limit = NAN
-        allowed[traces.stamp >= begin] = limit
-    return allowed
 
 
 def _planned(run: RecordedRun, traces: Traces) -> Mask:

@@ -10,5 +10,6 @@ faults              broken messages, wrong parameters, lost nodes, a long run, o
 plant               the plant's effects, each measured alone and compared with theory
 force_benchmark     random forces on random surfaces: outcomes, true force against the commanded one
 guard_validation    the stability guard validated by Monte Carlo simulation
+exact_cycles        size and period of the cycle of a simulated signal
 scorecard           the arm of a configuration compared with the requisites of chapter 3, and with the rule of 4.4
 """

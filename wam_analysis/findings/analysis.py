@@ -40,6 +40,11 @@ TOPICS_READ = (  # those for which any section asks; reading others would only c
     "task_axes", "status", "/diagnostics", "motor_states", "motor_current_command",
     "joint_posture_command", "joint_sensors", "gravity_effort",
 )  # fmt: skip
+SHOWN = (  # topics without which some section has less
+    "status", "joint_states", "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
+    "force_command", "force_measured", "contact/wrench", "contact/point", "contact/hypotheses",
+    "sim/joint_states", "sim/contact/wrench", "sim/contact/point",
+)  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",
     "force_command": "geometry_msgs/msg/WrenchStamped",
@@ -221,8 +226,9 @@ def happened_section(recording: AnalysedRecording) -> Section:
     sentences = [*wrong, *map(stated, faults[1:]), *_changed(run, zero)]
     if recording.parameters.note:
         sentences.append(f"Some numbers have no prediction: {recording.parameters.note}.")
-    lacking = run.lacking("joint_states", "force_command", "contact/wrench", "status")
-    return Section("happened", "What happened", sentences, (), lacking, (), wrong)
+    if missing := run.lacking(*SHOWN):
+        sentences.append(f"Not in this bag: {', '.join(missing)}.")
+    return Section("happened", "What happened", sentences, wrong=wrong)
 
 
 def _own_line(recording: AnalysedRecording) -> str:

@@ -18,8 +18,6 @@ BLIND = "Contacts while the brakes hold are not compared: without joint sensors 
 def contact_section(recording: AnalysedRecording) -> Section:
     """Estimated contacts, compared with the true ones."""
     traces = recording.traces
-    estimated = ("contact/wrench", "contact/point", "contact/hypotheses")
-    lacking = recording.run.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     findings: list[Finding] = []
     wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
     shows: list[str] = []
@@ -65,7 +63,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else stated(NOT_ESTIMATED))
-    return Section("contact", "Contact", sentences, findings, lacking, shows, wrong)
+    return Section("contact", "Contact", sentences, findings, shows, wrong)
 
 
 def _middle(values: Numbers) -> float:
@@ -92,9 +90,10 @@ def _contradicted(
     cm, place, sd, how = 100.0, contact.position, contact.position_sd, "estimated"
     if contact.true == contact.link and math.isfinite(contact.true_position):
         place, sd, how = contact.true_position, 0.0, "true"
-    if abs(place - declared) > SHAFT.sigmas * math.hypot(sd, loop.contact_position_sd if loop else 0.0):
-        at = f"{cm * place:.3g} +- {cm * sd:.2g}" if sd else f"{cm * place:.3g}"
-        yield f"{name}: declared position {cm * declared:.3g} cm, {how} position {at} cm."
+    stated, found = (f"{cm * each:.3g}" for each in (declared, place))
+    is_beyond = abs(place - declared) > SHAFT.sigmas * math.hypot(sd, loop.contact_position_sd if loop else 0.0)
+    if is_beyond and found != stated:
+        yield f"{name}: declared position {stated} cm, {how} position {found}{f' +- {cm * sd:.2g}' if sd else ''} cm."
 
 
 def _numbers(name: str, contact: ListedContact, period: float, declared: float) -> Iterator[Finding]:

@@ -1,8 +1,5 @@
 """Section about the efficiency in both directions, and the torque that backdrives each joint."""
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
@@ -26,30 +23,30 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
     known = np.isfinite(joint) & np.isfinite(motor)
     sentences, findings = [], []
     if np.any(known):
-        forward = efficiency(signals.time[known], motor[known], joint[known])
-        back = efficiency(signals.time[known], -joint[known], -motor[known])
-        lost = forward.put - forward.got + back.put - back.got
+        put, got = works(signals.time[known], motor[known], joint[known])
+        put_back, got_back = works(signals.time[known], -joint[known], -motor[known])
         mixed = known & (motor * joint < 0.0)
         stored = float(np.sum(np.abs(motor[mixed]))) * float(np.median(np.diff(signals.time)))
-        is_measured = not (forward.ratio > 1.0 or back.ratio > 1.0 or stored > lost)
-        if not is_measured:
+        if got > put or got_back > put_back or stored > put - got + put_back - got_back:
             sentences.append(
                 "The efficiency was not measured: rotors and cables store and return more work here than is lost."
             )
-        elif forward.put > SHAFT.least_work:
+            put = put_back = 0.0
+        if put > SHAFT.least_work:
             rows = known & (motor > 0.0) & (joint > 0.0)
             expected = max(1.0 - float(np.sum(_losses(signals)[rows]) / np.sum(motor[rows])), 0.0)
             note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
-            findings.append(Finding("efficiency, motors to links", "%", 100.0 * forward.ratio, 100.0 * expected, note))
-            sentences.append(f"While driving, the motors put {shown(forward.put, 'J')} into the transmission.")
-        if is_measured and back.put > SHAFT.least_work:
-            findings.append(Finding("efficiency, links to motors", "%", 100.0 * back.ratio, note="backdriven"))
-            sentences.append(f"The links, by their weight or a push, put {shown(back.put, 'J')} into it.")
+            findings.append(Finding("efficiency, motors to links", "%", 100.0 * got / put, 100.0 * expected, note))
+            sentences.append(f"While driving, the motors put {shown(put, 'J')} into the transmission.")
+        if put_back > SHAFT.least_work:
+            back = 100.0 * got_back / put_back
+            findings.append(Finding("efficiency, links to motors", "%", back, note="backdriven"))
+            sentences.append(f"The links, by their weight or a push, put {shown(put_back, 'J')} into it.")
     findings += _backdrive(signals.arm, recording.friction)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
     shows = [stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%"]
-    return Section("efficiency", "Efficiency and backdrivability", sentences, findings, (), shows)
+    return Section("efficiency", "Efficiency and backdrivability", sentences, findings, shows)
 
 
 def _losses(signals: TransmissionSignals) -> Numbers:
@@ -74,20 +71,8 @@ def _backdrive(arm: Arm, found: TransmissionFriction) -> list[Finding]:
     ]
 
 
-class Efficiency(NamedTuple):
-    """Work that was put in and got out while power flowed one way, J."""
-
-    put: float
-    got: float
-
-    @property
-    def ratio(self) -> float:
-        """NaN where no power flowed."""
-        return self.got / self.put if self.put > 0.0 else math.nan
-
-
-def efficiency(time: Numbers, put: Numbers, got: Numbers) -> Efficiency:
-    """Efficiency as work got out over work put in, 3.2.4, of the samples in which both powers are positive.
+def works(time: Numbers, put: Numbers, got: Numbers) -> tuple[float, float]:
+    """Work put in and got out, J, of the samples in which both powers are positive: their ratio is the efficiency.
 
     Parameters
     ----------
@@ -103,4 +88,4 @@ def efficiency(time: Numbers, put: Numbers, got: Numbers) -> Efficiency:
         dt = np.minimum(dt, np.median(dt[:-1]))
         dt[-1] = dt[-2]
     onward = (put > 0.0) & (got > 0.0)
-    return Efficiency(float(put[onward] @ dt[onward]), float(got[onward] @ dt[onward]))
+    return float(put[onward] @ dt[onward]), float(got[onward] @ dt[onward])

@@ -71,7 +71,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "
             "friction from a delay of the effort."
         )
-    return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, (), brief, wrong)
+    return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, brief, wrong)
 
 
 def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:

@@ -60,7 +60,6 @@ class Section(NamedTuple):
     title : for people.
     sentences : sentences, the most important first.
     findings : numbers.
-    lacking : topics that are not in the bag and would add to the section.
     shows, wrong : what of it belongs to the verdict, the most important first: what the recording shows, and what is
         wrong with it.
     """
@@ -69,7 +68,6 @@ class Section(NamedTuple):
     title: str
     sentences: Sequence[str]
     findings: Sequence[Finding] = ()
-    lacking: Sequence[str] = ()
     shows: Sequence[str] = ()
     wrong: Sequence[str] = ()
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.held_force import HeldForce, Theory
-from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.held_messages import step_at
 from wam_analysis.measures.response import StepResponse
 from wam_analysis.measures.swings import Swings
@@ -30,16 +29,15 @@ NO_FORCE = f"No commanded force was constant for {HOLD.shortest:g} s or longer"
 
 def force_section(recording: AnalysedRecording) -> Section:
     """Each commanded force, how it was reached and held, and the dynamic range (3.2.1)."""
-    lacking = recording.run.lacking("force_command", "force_measured", "sim/contact/wrench")
     held = recording.held
     reactions = [*((one.hold.name, one.hold.reactions) for one in held), *_other_reactions(recording).items()]
     reported = [pair for name, found in reactions for pair in in_words(name, found, recording.traces.zero)]
     sentences = [*map(_press_sentence, held), *([] if held else [f"{NO_FORCE}."])]
     sentences += [f"{what}: {why}." for what, why in reported]
     sentences += [WHOSE] * any(not one.hold.is_refused for one in held)
-    findings = [finding for one in held for finding in press_findings(one)] + _dynamic_range(recording)
+    findings = [finding for one in held for finding in press_findings(one)] + _dynamic_range(held)
     wrong = [f"{what}." for what, _ in reported]
-    return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong)
+    return Section("force", "Force", sentences, findings, _forces_verdict(held), wrong)
 
 
 def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -71,20 +69,16 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 
 
-def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
-    """Dynamic range (3.2.1) of the recording, and the largest force that the arm could give there."""
-    known = [one for one in recording.held if math.isfinite(one.best.smallest)]
+def _dynamic_range(held: Sequence[HeldForce]) -> list[Finding]:
+    """Dynamic range (3.2.1) of some forces."""
+    known = [one for one in held if math.isfinite(one.best.smallest)]
     if not known:
         return []
-    limits = [one.largest for one in recording.theories.values() if math.isfinite(one.largest.force)]
-    limit = min(limits, key=lambda limit: limit.force, default=LargestForce())
     smallest = max(one.best.smallest for one in known) or math.nan
     largest = max(0.0, *(one.hold.commanded + one.best.bias for one in known))
-    by = f"limited by {limit.limited_by}" if limits else ""
     return [
         Finding("largest error, bias plus ripple", "N", smallest),
         Finding("largest held force", "N", largest),
-        Finding("largest force that motors and cables allow", "N", math.nan, limit.force, by),
         Finding("dynamic range", "", largest / smallest, note="largest held force over the largest error"),
     ]
 
@@ -183,7 +177,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         whose = "controlled forces" if refused else "forces"
         count = "all" if settled == len(held) else f"{settled} of {len(held)}"
         verdict.append(f"Stability: {count} {whose} settled{margin}.")
-    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, wrong)
+    return Section("stability", "Stability and limit cycles", sentences, findings, verdict, wrong)
 
 
 def _fate(one: HeldForce) -> tuple[str, bool]:

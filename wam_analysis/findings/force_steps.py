@@ -141,7 +141,7 @@ def step_section(recording: AnalysedRecording) -> Section:
         hint = "; name the topic of its command with --command" * bool(forces and not followed)
         sentences.append(f"No step of a commanded force was recorded{hint}.")
     doubts += [text for one in forces if (text := _tared(one, recording.command_of(one)))]
-    return Section("force", "Force", (*sentences, *doubts), findings, (), shows, doubts)
+    return Section("force", "Force", (*sentences, *doubts), findings, shows, doubts)
 
 
 def _tared(measured: Source, command: Source | None) -> str:

@@ -22,8 +22,7 @@ def friction_section(recording: AnalysedRecording) -> Section:
     """Friction of motors and joints, next to what is configured."""
     signals, motors, joints, unknown = recording.friction
     if signals is None:
-        missing = recording.run.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
-        return Section("friction", "Friction", (unknown,), (), missing)
+        return Section("friction", "Friction", (unknown,))
     arm = signals.arm
     alone = signals.load_from == CABLE
     note = "with the joint's friction; " * (not alone) + f"load from the {signals.load_from}"
@@ -40,10 +39,9 @@ def friction_section(recording: AnalysedRecording) -> Section:
         sentences.append(f"This recording does not determine {', '.join(unsure)}: {MORE}.")
     if still := [name for name, one in every.items() if math.isnan(one.dynamic.value)]:
         sentences.append(f"No friction found for {', '.join(still)}: too little motion, or other torques act, too.")
-    lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)
     stated = (*[unknown][: bool(unknown)], *signals.caveats, *sentences, *flagged)
-    return Section("friction", "Friction", stated, findings, lacking, flagged)
+    return Section("friction", "Friction", stated, findings, flagged)
 
 
 def _configured(shafts: Motors | Joints) -> Numbers:

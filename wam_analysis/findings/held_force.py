@@ -7,16 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_list import most
-from wam_analysis.findings.prediction import (
-    Guarded,
-    LargestForce,
-    Predicted,
-    PressedPoint,
-    guarded,
-    largest_force,
-    node_at,
-    predict,
-)  # fmt: skip
+from wam_analysis.findings.prediction import Guarded, Predicted, PressedPoint, guarded, node_at, predict
 from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.holds import Hold, measured_force
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
@@ -192,7 +183,7 @@ def _touch_down(traces: Traces, parameters: PredictionParameters, hold: Hold) ->
             continue
         cover = hold.cover or hold.frame
         acts = signal.acts & ((signal.frame == cover) | (cover not in signal.frame))
-        free = np.flatnonzero(~acts[:first]) if acts[first] else np.array([first + int(np.argmax(acts[first:])) - 1])
+        free = np.flatnonzero(~acts[: first + int(np.argmax(acts[first:last]))])
         if not np.any(acts[first:last]) or not len(free) or not signal.is_known[free[-1]]:
             return math.nan
         begin = float(traces.stamp[free[-1] + 1] - hold.begin) / 1e9
@@ -257,13 +248,12 @@ class Theory(NamedTuple):
 
     Attributes
     ----------
-    predicted, largest : by chapters 3 and 5.
+    predicted : by chapter 5.
     guarded : by the stability guard.
     moved : size of the cycle of a motor as a motion of the contact along the force, m; NaN if it is not known.
     """
 
     predicted: Predicted = Predicted()
-    largest: LargestForce = LargestForce()
     guarded: Guarded | None = None
     moved: float = math.nan
 
@@ -282,9 +272,8 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
         axis = body.cover_pose(q, hold.frame).rotation @ axis
     press = PressedPoint(body, q, link, position, axis)
     node = node_at(parameters, press) if link == cover else None
-    largest = largest_force(press)
     if node is None:
-        return Theory(largest=largest)
+        return Theory()
     loop, predicted = parameters.force_loop, Predicted()
     if loop is not None and loop.mode == "hybrid":
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
@@ -295,7 +284,7 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
         turned = TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre
         ratio = abs(dict(zip(arm.motors.names, turned.tolist(), strict=True)).get(seen.shaft, 0.0))
         moved = seen.swings.peak_to_peak / ratio if ratio else math.nan
-    return Theory(predicted, largest, found, moved)
+    return Theory(predicted, found, moved)
 
 
 def _along(gains: Sequence[float], force: Numbers) -> float:

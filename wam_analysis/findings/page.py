@@ -49,7 +49,7 @@ table.numbers { border-collapse: collapse; margin: 12px 0 0; font-size: 0.9rem; 
 .numbers th, .numbers td { padding: 4px 0 4px 14px; max-width: 11em; overflow-wrap: normal; }
 .numbers th:first-child, .numbers td:first-child { text-align: left; padding-left: 0; max-width: 20em; }
 .numbers .deviates { color: var(--bad); font-weight: 600; }
-small, .lacking { color: var(--faint); }
+small { color: var(--faint); }
 summary { cursor: pointer; margin-top: 12px; color: var(--link); }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; font-size: 0.8rem; }
 dl { display: grid; grid-template-columns: minmax(7em, 30%) 1fr; gap: 4px 12px; margin: 0; font-size: 0.9rem; }
@@ -118,14 +118,11 @@ def _digest(text: str) -> str:
 def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
     sentences = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in section.sentences)
     figures = "".join(figure for key, figure in drawn if key == section.key)
-    lacking = ""
-    if section.lacking:
-        lacking = f'<p class="lacking"><small>Not in this bag: {html.escape(", ".join(section.lacking))}.</small></p>'
     numbers = tabulated(section.findings)
     tables = "".join([*(f"<p><small>{text}.</small></p>" for text in legends(numbers)), *map(_table, numbers)])
     return (
         f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2><ul>{sentences}</ul>'
-        f"{tables}{_notes(section.findings)}{figures}{lacking}</section>"
+        f"{tables}{_notes(section.findings)}{figures}</section>"
     )
 
 

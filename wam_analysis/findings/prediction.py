@@ -144,35 +144,6 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     return Predicted(size, period, actuator)
 
 
-class LargestForce(NamedTuple):
-    """Largest force that the arm can press with, N, and its limit; NaN if it is not known."""
-
-    force: float = math.nan
-    limited_by: str = ""
-
-
-def largest_force(press: PressedPoint) -> LargestForce:
-    """Largest controllable force by 3.2.1: peak torques of the motors, less the weight, and strength of the cables."""
-    body, arm = press.body, press.body.arm
-    transmission = TransmissionMap.of(arm)
-    motor = np.array(transmission.motor_torques(press.torque.tolist()))  # per newton
-    carried = np.array(transmission.motor_torques(body.gravity_torque(press.q).tolist()))
-    best = LargestForce(math.inf, "nothing")
-    for i, name in enumerate(arm.motors.names):
-        if abs(motor[i]) < 1e-9:
-            continue
-        circuit = arm.circuits[i]
-        taut = 2.0 * (circuit.breaking_strength - circuit.pretension) * circuit.radius
-        cable = (
-            taut if taut <= 2.0 * circuit.pretension * circuit.radius else circuit.breaking_strength * circuit.radius
-        )
-        for limit, what in ((arm.motors.peak_torque[i], f"peak torque of {name}"), (cable, f"cable of {name}")):
-            room = limit - math.copysign(1.0, motor[i]) * carried[i]
-            if room / abs(motor[i]) < best.force:
-                best = LargestForce(max(room, 0.0) / abs(float(motor[i])), what)
-    return best
-
-
 class Guarded(NamedTuple):
     """The guard's result for the sampled loop with its velocity loops, see `wam_control.force.sampled_loop`.
 

@@ -20,6 +20,13 @@ LEAST = {"rad": 1e-4, "m": 1e-5, "rad/s": 1e-3, "m/s": 1e-4, "N m": 1e-3, "N": 1
 
 COMMANDED_CYCLE, LIMIT_CYCLE, UNKNOWN = "commanded", "limit cycle", "not known whether commanded"
 HARMONIC = "near a multiple of the commanded frequency"
+ORIGINS = {  # in words
+    LIMIT_CYCLE: "a limit cycle: it was not commanded",
+    HARMONIC: f"{HARMONIC}: a limit cycle, or the commanded motion, which is not followed linearly",
+    UNKNOWN: "its command is not known: give its topic with --command, or in a CSV file name its column "
+    "command.position.JOINT",
+    COMMANDED_CYCLE: "repeats as it was commanded",
+}
 
 
 class FoundCycle(NamedTuple):
@@ -32,8 +39,8 @@ class FoundCycle(NamedTuple):
 
 def repetition_section(recording: AnalysedRecording) -> Section:
     """What repeats, and whether it was commanded."""
-    sentences, findings, verdict = [], [], []
-    taken: set[str] = set()
+    findings, verdict, taken = [], [], set[str]()
+    alike: dict[str, list[str]] = {origin: [] for origin in ORIGINS}
     for one, quantity, label in traced(recording.states):
         unit, command = one.units[quantity], recording.command_of(one)
         own = None if command is None else command.only(quantity if quantity in command.values else "velocity")
@@ -43,9 +50,11 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 begin, end, cycle = found.episode
                 name = label if label not in taken else f"{label} from {begin:.1f} s"
                 taken.add(name)
-                sentences.append(_sentence(label, unit, found))
+                change = 100.0 * (cycle.growth - 1.0)
+                is_steady = CYCLE.changing < cycle.growth < 1.0 / CYCLE.changing
+                alike[found.origin].append(name + f" (changes by {change:+.0f} % from half to half)" * (not is_steady))
                 frequency = 1.0 / cycle.period
-                if found.origin not in (COMMANDED_CYCLE, HARMONIC):
+                if found.origin in (LIMIT_CYCLE, UNKNOWN):
                     size = f"{shown(frequency, 'Hz')}, {shown(cycle.peak_to_peak, unit)} peak to peak"
                     verdict.append(f"{name} repeats at {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
                 findings += [
@@ -58,28 +67,9 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                     Finding(f"{name}: confidence", "", cycle.confidence),
                 ]
     which = "that was not commanded" if recording.commands else "in this recording"
+    sentences = [f"{', '.join(names)}: {ORIGINS[origin]}." for origin, names in alike.items() if names]
     stated = sentences or [f"Nothing {which} repeats five times."]
-    return Section("stability", "Cycles", stated, findings, (), verdict)
-
-
-def _sentence(label: str, unit: str, found: FoundCycle) -> str:
-    begin, end, cycle = found.episode
-    size = f"{shown(cycle.peak_to_peak, unit)} peak to peak"
-    if not CYCLE.changing < cycle.growth < 1.0 / CYCLE.changing:
-        change = f"{'growing' if cycle.growth > 1.0 else 'shrinking'} by {100.0 * abs(cycle.growth - 1.0):.0f} %"
-        size += f", {change} from half to half"
-    where = f"from {begin:.1f} to {end:.1f} s (confidence {cycle.confidence:.2f})"
-    frequency = shown(1.0 / cycle.period, "Hz")
-    if found.origin == LIMIT_CYCLE:
-        return f"{label}: limit cycle of {size}, at {frequency} {where}; it was not commanded."
-    ends = {
-        COMMANDED_CYCLE: ", as it was commanded",
-        HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion, "
-        "which is not followed linearly",
-        UNKNOWN: "; its command is not known: give its topic with --command, or in a CSV file name its column "
-        "command.position.JOINT",
-    }
-    return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."
+    return Section("stability", "Cycles", stated, findings, verdict)
 
 
 def spectrum_section(recording: AnalysedRecording) -> Section:

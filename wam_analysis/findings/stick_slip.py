@@ -16,7 +16,6 @@ from wam_bag.arrays import Numbers
 def stick_section(recording: AnalysedRecording) -> Section:
     """How long each motor and joint was at rest, and how often it moved; whether it sticks under a command."""
     sentences, findings, verdict = [], [], []
-    lacking = () if recording.is_foreign else recording.run.lacking("motor_states")
     for one in recording.states:
         command = recording.command_of(one)
         # not a position that is sent once and held
@@ -47,7 +46,7 @@ def stick_section(recording: AnalysedRecording) -> Section:
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
     stated = sentences or ["No velocity was recorded."]
-    return Section("stick_slip", "Stick and slip", stated, findings, lacking, verdict)
+    return Section("stick_slip", "Stick and slip", stated, findings, verdict)
 
 
 class Sticking(NamedTuple):

@@ -13,7 +13,7 @@ from wam_analysis.findings.tabulated import Table, legends, tabulated
 from wam_analysis.table import plain
 from wam_analysis.thresholds import LAYOUT
 
-SCHEMA = 4  # of the JSON; incremented when a key changes its name or meaning
+SCHEMA = 5  # of the JSON; incremented when a key changes its name or meaning
 
 
 def text(analysis: Analysis, width: int | None = None) -> str:
@@ -27,14 +27,12 @@ def text(analysis: Analysis, width: int | None = None) -> str:
     wide = min(max(wide, LAYOUT.narrowest), LAYOUT.width)
     lines: list[str] = []
     for section in analysis.sections:
-        if not (section.sentences or section.findings or section.lacking):
+        if not (section.sentences or section.findings):
             continue  # the page has charts there
         lines += ["", section.title, "─" * len(section.title)]
         for sentence in section.sentences:
             lines += _wrapped(sentence, wide)
         lines += _table_lines(section.findings, wide)
-        if section.lacking:
-            lines += _wrapped(f"not in this bag: {', '.join(section.lacking)}", wide)
     lines += ["", "Provenance", "──────────"]
     lines += [line for key, value in analysis.provenance.items() for line in _wrapped(f"{key}: {value}", wide)]
     return "\n".join(lines).lstrip("\n")
@@ -77,7 +75,7 @@ def document(analysis: Analysis) -> dict[str, Any]:
             {
                 "key": section.key,
                 "title": section.title,
-                **{name: list(getattr(section, name)) for name in ("sentences", "shows", "wrong", "lacking")},
+                **{name: list(getattr(section, name)) for name in ("sentences", "shows", "wrong")},
                 "findings": [_finding(finding) for finding in section.findings],
             }
             for section in analysis.sections

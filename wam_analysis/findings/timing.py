@@ -40,12 +40,11 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
     for one in recording.analysed:
         if len(one.time) >= SHAFT.fewest_samples:
             senders.setdefault((one.topic, one.sent.tobytes()), []).append(one)
+    topics = [topic for topic, _ in senders]
     for (topic, _), those in senders.items():
         first, name = those[0], topic
-        others = [some[0] for (other, _), some in senders.items() if other == topic and some is not those]
-        if others:
-            name += f" ({first.frame})" if first.frame and all(one.frame != first.frame for one in others) else ""
-            name += f" of {', '.join(one.name for one in those)}" if first.is_joint else ""
+        if topics.count(topic) > 1:
+            name += f" ({', '.join(one.name or one.frame for one in those)})"
         stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
         columns: Any = recording.bag.topics[topic]
         is_table = np.array_equal(columns.stamp_ns, columns.log_time_ns)  # or messages without stamps
@@ -97,8 +96,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
         )
     if not findings:
         sentences.append("No stamped topic of the loop was recorded.")
-    lacking = recording.run.lacking(*TIMED[:2])
-    return Section("timing", "Timing of the loop", sentences, findings, lacking, (), wrong)
+    return Section("timing", "Timing of the loop", sentences, findings, (), wrong)
 
 
 def provenance(recording: AnalysedRecording) -> dict[str, str]:

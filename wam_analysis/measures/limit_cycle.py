@@ -32,11 +32,6 @@ class LimitCycle(NamedTuple):
     growth: float
     shape: Numbers
 
-    def __repr__(self) -> str:
-        """The numbers, and how many phases there are in place of all."""
-        numbers = (f"{name}={getattr(self, name):.4g}" for name in self._fields if name != "shape")
-        return f"LimitCycle({', '.join(numbers)}, shape of {len(self.shape)} phases)"
-
 
 NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
 
@@ -102,32 +97,6 @@ def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
     """
     phases = max(min(CYCLE.phases, len(value) // CYCLE.phase_samples), 2)
     return _fold(value - np.mean(value), time / period % 1.0, phases).size
-
-
-class CycleExtent(NamedTuple):
-    """Peak to peak, in the unit of the signal, and period, s, of a cycle; NaN if there is none."""
-
-    peak_to_peak: float
-    period: float
-
-
-def last_cycle(time: Numbers, value: Numbers) -> CycleExtent:
-    """The last whole cycle of a signal that is known to cycle, from one rising crossing of the middle to the next.
-
-    Unlike `limit_cycle` it takes every such crossing for a cycle: the signal must have no noise.
-
-    Parameters
-    ----------
-    time : (n,), s, at a constant rate.
-    value : (n,), the signal.
-    """
-    late = value[len(value) // 2 :]
-    above = value > 0.5 * (late.max() + late.min())
-    rises = np.flatnonzero(above[1:] & ~above[:-1])  # samples before each
-    if len(rises) < 2:
-        return CycleExtent(math.nan, math.nan)
-    begin, end = rises[-2], rises[-1]
-    return CycleExtent(float(np.ptp(value[begin : end + 1])), float(time[end] - time[begin]))
 
 
 def _period(flat: Numbers) -> float:

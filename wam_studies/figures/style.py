@@ -12,13 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from wam_analysis.drawing import COLOURS, PREDICTED, SHAFTS, STYLE, widen_flat
+from wam_analysis.drawing import COLOURS, PREDICTED, SHAFTS, STYLE
 from wam_studies.figures.panels import FEW, Mark, Panel
 
 GREY = "#777777"
 SHADES = (*SHAFTS[1:5], SHAFTS[0], *SHAFTS[5:])
 DPI = 200
 MOST_POINTS = 2000  # of a recording, drawn
+STILL = 1e-5  # rad, rad/s, N: a smaller range of a plot is not blown up
+FLAT = 1e-4  # of the value, the same
 
 
 @contextmanager
@@ -75,11 +77,20 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set_xlim(low_x, high_x)
     axes.set_ylim(low_y, high_y)
     if not panel.logarithmic:
-        widen_flat(axes)
+        _widen_flat(axes)
     handles, labels = axes.get_legend_handles_labels()
     if any(labels):
         once = dict(zip(labels, handles, strict=True))
         axes.legend(once.values(), once)
+
+
+def _widen_flat(axes: Any) -> None:
+    """Show a quantity that does not change as a line, not its rounding errors."""
+    for limits, widen in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
+        low, high = limits
+        least = max(STILL, FLAT * abs(low + high) / 2.0)
+        if high - low < least:
+            widen((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def _name(axes: Axes, mark: Mark) -> None:

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_analysis.measures.limit_cycle import last_cycle
 from wam_analysis.table import markdown
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_sim.batch import processes, results
 from wam_sim.pieces import default_file
+from wam_studies.exact_cycles import last_cycle
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     LEVER,

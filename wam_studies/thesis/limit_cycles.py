@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wam_analysis.measures.limit_cycle import CycleExtent, last_cycle
+from wam_studies.exact_cycles import CycleExtent, last_cycle
 from wam_studies.figures.panels import Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, TestbedStep, played

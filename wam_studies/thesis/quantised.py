@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from wam_analysis.measures.limit_cycle import last_cycle
 from wam_driver.driver import DriverParameters
+from wam_studies.exact_cycles import last_cycle
 from wam_studies.figures.panels import Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import TestbedStep, played

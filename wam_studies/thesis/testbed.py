@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from wam_analysis.measures.limit_cycle import last_cycle
 from wam_analysis.measures.swings import swings
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_description.arm import Servo
+from wam_studies.exact_cycles import last_cycle
 from wam_studies.figures.panels import Numbers, Panel
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import ACROSS, OneLink, TestbedStep, one_link, played
