@@ -14,7 +14,7 @@ contact                section about contacts, estimated and true
 prediction             the friction node at the contact, what chapter 5 and the stability guard predict for it
 transmission           motors, cables and joints on one time base, and their friction
 friction               section about friction
-efficiency             section about efficiency and backdrivability
+efficiency             section about efficiency
 timing                 section about the loop, and provenance
 tabulated              tables of subjects and quantities
 charts, plots          the charts, as numbers, and the picture of the arm

@@ -34,16 +34,13 @@ from wam_sim.recorded_run import RecordedRun
 Progress = Callable[[str], None]
 Maker = Callable[[AnalysedRecording], Section | None]
 
-TOPICS_READ = (  # those for which any section asks; reading others would only cost time
-    "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
-    "sim/disturbance", "sim/joint_states", "joint_states", "contact/hypotheses", "force_axis", "task_command",
-    "task_axes", "status", "/diagnostics", "motor_states", "motor_current_command",
-    "joint_posture_command", "joint_sensors", "gravity_effort",
-)  # fmt: skip
 SHOWN = (  # topics without which some section has less
     "status", "joint_states", "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
     "force_command", "force_measured", "contact/wrench", "contact/point", "contact/hypotheses",
     "sim/joint_states", "sim/contact/wrench", "sim/contact/point",
+)  # fmt: skip
+TOPICS_READ = (  # those for which any section asks; reading others would only cost time
+    *SHOWN, "sim/disturbance", "force_axis", "task_command", "task_axes", "joint_posture_command", "/diagnostics",
 )  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",

@@ -1,15 +1,12 @@
-"""Section about the efficiency in both directions, and the torque that backdrives each joint."""
+"""Section about the efficiency in both directions."""
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
-from wam_analysis.findings.transmission import TransmissionFriction, TransmissionSignals
-from wam_analysis.measures.friction import Friction
+from wam_analysis.findings.transmission import TransmissionSignals
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers
-from wam_description.arm import Arm
-from wam_description.transmission_map import TransmissionMap
 
 
 def efficiency_section(recording: AnalysedRecording) -> Section | None:
@@ -42,11 +39,10 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
             back = 100.0 * got_back / put_back
             findings.append(Finding("efficiency, links to motors", "%", back, note="backdriven"))
             sentences.append(f"The links, by their weight or a push, put {shown(put_back, 'J')} into it.")
-    findings += _backdrive(signals.arm, recording.friction)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
-    shows = [stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%"]
-    return Section("efficiency", "Efficiency and backdrivability", sentences, findings, shows)
+    shows = [stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings]
+    return Section("efficiency", "Efficiency", sentences, findings, shows)
 
 
 def _losses(signals: TransmissionSignals) -> Numbers:
@@ -55,20 +51,6 @@ def _losses(signals: TransmissionSignals) -> Numbers:
     loss = sum(np.abs(v) @ one.dynamic_friction + v**2 @ one.viscous_friction for one, v in shafts)
     creep = [circuit.loss_per_torque for circuit in signals.arm.circuits]
     return loss + signals.load**2 * np.abs(signals.velocity) @ np.array(creep)
-
-
-def _backdrive(arm: Arm, found: TransmissionFriction) -> list[Finding]:
-    """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
-    turns = np.abs(TransmissionMap.of(arm).motor_from_joint)
-    measured = np.array([found.motors[name].dynamic.value for name in arm.motors.names])
-    own = [found.joints.get(name, Friction()).dynamic.value for name in arm.joints.names]
-    torque = np.where(turns > 1e-9, turns * measured[:, None], 0.0).sum(axis=0) + own
-    expected = arm.motors.dynamic_friction @ turns + arm.joints.dynamic_friction
-    note = "dry friction of the joint and of its motors"
-    return [
-        Finding(f"{name}: backdriving torque", "N m", needed, predicted, note)
-        for name, needed, predicted in zip(arm.joints.names, torque.tolist(), expected.tolist(), strict=True)
-    ]
 
 
 def works(time: Numbers, put: Numbers, got: Numbers) -> tuple[float, float]:

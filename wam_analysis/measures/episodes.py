@@ -53,13 +53,12 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             inner = slice(first + edge if first else 0, last - edge if last < n else n)
             if inner.stop - inner.start < CYCLE.episode_cycles * lag:
                 inner = slice(first, last)  # with its ends within the recording
-            period = _refined(time[inner], flat[inner], cycle.period)
-            both = (_cycle(time[inner], signal[inner], least, period) for signal in (value, flat))
+            both = (_cycle(time[inner], signal[inner], least, cycle.period) for signal in (value, flat))
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
             is_shape = CYCLE.slowest_cycles * (last - first) < np.max(longest[first:last] % n)  # of a slower one
             goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-            if is_shape or goes_on or (better is None and _changes(time[inner], flat[inner], period)):
-                transients.append(_Transient(first, last, period, _width(time, period)))
+            if is_shape or goes_on or (better is None and _changes(time[inner], flat[inner], cycle.period)):
+                transients.append(_Transient(first, last, cycle.period, _width(time, cycle.period)))
                 lag = 0.0  # its last part is no limit cycle
             else:
                 if better is None:  # a step disturbs it elsewhere
@@ -102,17 +101,6 @@ def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan
 def _width(time: Numbers, period: float) -> int:
     """Samples of two periods."""
     return max(2 * round(period / float(time[1] - time[0])), 2)
-
-
-def _refined(time: Numbers, flat: Numbers, period: float) -> float:
-    """The period by the drift of the phase of its first harmonic: an error of it blurs the mean of many cycles."""
-    width = _width(time, period)
-    turns = flat * np.exp(-2j * np.pi * (time - time[0]) / period)
-    phase = np.unwrap(np.angle(np.convolve(turns, np.ones(width) / width, "valid")))
-    if len(phase) < width:
-        return period
-    slope = float(np.polynomial.polynomial.polyfit(time[: len(phase)], phase, 1)[1])
-    return 1.0 / (1.0 / period + slope / (2.0 * math.pi))
 
 
 def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:

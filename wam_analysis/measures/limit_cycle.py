@@ -39,9 +39,9 @@ NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
 def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> LimitCycle:
     """Find the cycle that repeats in a signal.
 
-    The period is the lag with the highest autocorrelation, refined over all cycles.  The signal is then
-    folded on it, which averages noise and keeps the height of a sawtooth or a jump.  A linear drift is removed; that of
-    a known period together with its first harmonic, which alone looks like a drift, too.
+    The period is the lag with the highest autocorrelation, refined by the drift of its phase.  The signal is then
+    folded on it, which averages noise and keeps the height of a sawtooth or a jump.  A linear drift is removed,
+    together with the first harmonic, which alone looks like a drift, too.
 
     Parameters
     ----------
@@ -58,18 +58,16 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     if n < 4 * CYCLE.cycles or float(np.ptp(value)) == 0.0 or np.any(after_gaps(time)):
         return NO_CYCLE
     seconds = float(time[-1] - time[0]) / (n - 1)
-    centre = np.linspace(-1.0, 1.0, n)
-    flat = value - np.mean(value)
-    if math.isnan(period):
-        flat = flat - centre * float(centre @ flat) / float(centre @ centre)
-    lag = _period(flat) if math.isnan(period) else period / seconds
+    centre, flat = np.linspace(-1.0, 1.0, n), value - np.mean(value)
+    level = flat - centre * float(centre @ flat) / float(centre @ centre)
+    lag = _period(level) if math.isnan(period) else period / seconds
     if not lag >= CYCLE.shortest_period:
         return NO_CYCLE
+    lag = _refined(level, lag)
     phase = np.arange(n) / lag % 1.0
-    if not math.isnan(period):
-        turn = 2.0 * math.pi * phase
-        drift = np.column_stack([centre, np.cos(turn), np.sin(turn), np.ones(n)])
-        flat = flat - centre * np.linalg.lstsq(drift, flat, rcond=None)[0][0]
+    turn = 2.0 * math.pi * phase
+    drift = np.column_stack([centre, np.cos(turn), np.sin(turn), np.ones(n)])
+    flat = flat - centre * np.linalg.lstsq(drift, flat, rcond=None)[0][0]
     phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
     folded = _fold(flat, phase, phases)
     half = n // 2
@@ -100,7 +98,7 @@ def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
 
 
 def _period(flat: Numbers) -> float:
-    """Lag of the first of the highest peaks of the autocorrelation, in samples, refined; NaN for none.
+    """Lag of the first of the highest peaks of the autocorrelation, in samples; NaN for none.
 
     The peaks of a fast cycle are between the samples: a peak is as high as the cosine through it and its neighbours.
     """
@@ -120,17 +118,19 @@ def _period(flat: Numbers) -> float:
     before, peak, after = three[:, peaks]
     turn = np.clip(0.5 * (before + after) / peak, -1.0, 1.0)
     heights = np.hypot(peak, 0.5 * (after - before) / np.sqrt(np.maximum(1.0 - turn**2, 1e-300)))
-    guess = _top(likeness, first + 1 + int(peaks[heights >= CYCLE.correlated * np.max(heights)][0]))
-    times = 2
-    while guess >= 1.0 and times * guess < n / 2.0 - 1.0:
-        reach = max(1, int(guess / 4.0))
-        middle = round(times * guess)
-        low, high = max(middle - reach, 1), min(middle + reach + 1, len(likeness) - 1)
-        if high - low < 3:
-            break
-        guess = _top(likeness, low + int(np.argmax(likeness[low:high]))) / times
-        times *= 2
-    return guess
+    return _top(likeness, first + 1 + int(peaks[heights >= CYCLE.correlated * np.max(heights)][0]))
+
+
+def _refined(flat: Numbers, lag: float) -> float:
+    """The lag by the drift of the phase of its first harmonic: an error of it blurs the mean of many cycles."""
+    width = max(2 * round(lag), 2)
+    turns = flat * np.exp(-2j * np.pi * np.arange(len(flat)) / lag)
+    phase = np.unwrap(np.angle(np.convolve(turns, np.ones(width) / width, "valid")))
+    if len(phase) < width:
+        return lag
+    slope = float(np.polynomial.polynomial.polyfit(np.arange(len(phase)), phase, 1)[1])
+    found = 1.0 / (1.0 / lag + slope / (2.0 * math.pi))
+    return found if abs(found / lag - 1.0) < CYCLE.same_period else lag
 
 
 def _top(values: Numbers, row: int) -> float:
