@@ -44,7 +44,7 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
     for (topic, _), those in senders.items():
         first, name = those[0], topic
         if topics.count(topic) > 1:
-            name += f" ({', '.join(one.name or one.frame for one in those)})"
+            name += f" of {', '.join(one.name or one.frame for one in those)}"
         stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
         columns: Any = recording.bag.topics[topic]
         is_table = np.array_equal(columns.stamp_ns, columns.log_time_ns)  # or messages without stamps
