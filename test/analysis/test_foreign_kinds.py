@@ -665,16 +665,16 @@ def test_a_command_without_an_axis_is_that_of_the_axis_that_follows_and_spikes_h
     assert not any("more than most robots" in sentence for section in sections for sentence in section.sentences)
 
 
-@pytest.mark.parametrize(("change", "since", "said"), [
-    (lambda t: RISE - 6.0 * (t > 9.0), 2.0, "the force jumps from one message to the next at 9.0 s, by up to 6"),
-    (lambda t: RISE + 0.01 * np.exp(0.35 * t) * np.sin(30.0 * t), 2.0, "the force DIVERGES, by"),
-    (lambda t: 5.7 + 0.0 * t, 0.0, "wrench, 6 N at 0.0 s: commanded from the beginning."),
-    (lambda t: 6.0 * (t >= 7.0), 7.0, "wrench, 6 N at 7.0 s: a step from 0 N."),
+@pytest.mark.parametrize(("change", "since", "ramp", "said"), [
+    (lambda t: RISE - 6.0 * (t > 9.0), 2.0, 1e-6, "the force jumps from one message to the next at 9.0 s, by up to 6"),
+    (lambda t: RISE + 0.01 * np.exp(0.35 * t) * np.sin(30.0 * t), 2.0, 1e-6, "the force DIVERGES, by"),
+    (lambda t: 5.7 + 0.0 * t, 0.0, 1e-6, "wrench, 6 N at 0.0 s: commanded from the beginning."),
+    (lambda t: 3.0 * np.clip(t - 5.0, 0.0, 2.0), 7.0, 2.0, "wrench, 6 N at 7.0 s: a step from 0 N."),
 ])  # fmt: skip
-def test_what_a_force_does_is_said(change: Any, since: float, said: str) -> None:
+def test_what_a_force_does_is_said(change: Any, since: float, ramp: float, said: str) -> None:
     time = np.arange(0.0, 20.0, 0.004)
     force = change(time) + np.random.default_rng(4).normal(0.0, 0.03, len(time))
-    table = {"time": time, "force.z": force, "command.force.z": 6.0 * (time >= since)}
+    table = {"time": time, "force.z": force, "command.force.z": np.interp(time, [since - ramp, since], [0.0, 6.0])}
     sections = analyse(table, lambda doing: None).sections
     assert said in " ".join(sentence for section in sections for sentence in section.sentences)
     assert any(said in sentence for section in sections for sentence in section.wrong) is ("the force" in said)

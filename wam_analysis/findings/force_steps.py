@@ -62,37 +62,39 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     if not axes or not np.any(known):
         return []
     desired = np.column_stack([command.values[axis] for axis in axes])
-    changed = np.flatnonzero(np.any(np.abs(np.diff(desired, axis=0)) > HOLD.equal_force, axis=1)) + 1
-    begins = [0, *changed.tolist()]
-    ends = [*command.time[changed].tolist(), float(measured.time[-1])]
+    changes = np.any(np.abs(np.diff(desired, axis=0)) > HOLD.equal_force, axis=1)
+    edges = np.flatnonzero([True, *changes, True])
+    at = np.append(command.time, measured.time[-1])[edges]
+    is_held = command.arrives[edges[:-1]] | (np.diff(at) >= HOLD.shortest)  # or else part of a ramp
+    is_held[0] = True
     stretches = pieces(measured)
-    rows = row_at(command.time, measured.time[known])
     got = np.column_stack([measured.values[axis][known] for axis in axes])
-    wanted = desired[rows]
+    wanted = desired[row_at(command.time, measured.time[known])]
     middle = wanted.mean(axis=0) if np.any(wanted != wanted[0]) else 0.0
     sign = np.sign(np.sum(got * (wanted - middle))) or 1.0
-    found, arrives = [], command.arrives
-    for last, row, until in zip([0.0 * desired[0], *desired[begins[:-1]]], begins, ends, strict=True):
-        begin = max(float(command.time[row]), float(measured.time[0]))
-        end = min(until, command.leaves(begin), measured.leaves(begin))
-        change = desired[row] - last
+    found, held = [], np.flatnonzero(is_held)
+    for left, part in zip([0, *held + 1], held, strict=False):
+        row, begin = edges[part], max(float(at[part]), float(measured.time[0]))
+        end = min(at[part + 1], command.leaves(begin), measured.leaves(begin))
+        since, was = at[left], desired[edges[left] - 1] * (left > 0)
+        change = desired[row] - was
         size = float(np.linalg.norm(change))
-        if size <= HOLD.equal_force or arrives[row] or end - begin < HOLD.shortest:
+        if size <= HOLD.equal_force or command.arrives[row] or end - begin < HOLD.shortest:
             continue
         way = change / size
         way *= np.sign(way[np.argmax(np.abs(way))])
         for piece in stretches:
             value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
-            before = value[(piece.time < begin) & (piece.time >= begin - HOLD.before)]
-            after = (piece.time >= begin) & (piece.time < end)
+            before = value[(piece.time < since) & (piece.time >= since - HOLD.before)]
+            after = (piece.time >= since) & (piece.time < end)
             if np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
             time, reached = piece.time[after] - begin, value[after]
-            left, to = (float(one @ way) for one in (last, desired[row]))
+            away, to = (float(one @ way) for one in (was, desired[row]))
             start = float(np.mean(before)) if len(before) else math.nan
             is_first = not row and is_known(command, measured.time)
             response, swinging = force_response(time, reached, start, to, size)
-            found.append(ForceStep(measured.label, begin, math.nan if is_first else left, to, response, swinging))
+            found.append(ForceStep(measured.label, begin, math.nan if is_first else away, to, response, swinging))
     return found
 
 

@@ -23,8 +23,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
-    clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
-    wrong = [*_treated(found), *clocks]
+    wrong = [*_treated(found), *(f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note)]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
         f"took turns; the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
@@ -52,8 +51,8 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         if none := [joint for i, joint in enumerate(columns.names) if not np.isfinite(numbers[:, i::number]).any()]:
             yield f"{name}: {', '.join(none)} without a number for position, velocity or effort."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
-        sizes = np.sqrt(np.nansum(columns.force**2, axis=1))[np.isfinite(columns.force).any(axis=1)]
-        what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
+        largest = _largest(np.sqrt(np.nansum(columns.force**2, axis=1)))
+        what = f"up to {shown(largest, 'N')}" if np.isfinite(columns.force).any() else "none of which is a number"
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
 
 

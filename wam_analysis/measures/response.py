@@ -41,7 +41,7 @@ def step_response(
 
     Parameters
     ----------
-    time : (n,), s from the step, rising, at a constant rate.
+    time : (n,), s from the step, rising, at a constant rate; below 0 in a ramp that leads to it.
     value : (n,), the signal.
     begin : value before the step; NaN where it is not known.
     steady : length of the end that counts as steady, s.
@@ -70,7 +70,7 @@ def step_response(
     elif time[outside[-1]] >= time[-1] - steady:
         settling = math.inf  # what leaves the band in the steady end has not settled, wherever the recording stops
     else:
-        settling = _between(time, np.abs(part - 1.0), int(outside[-1]), band)
+        settling = max(_between(time, np.abs(part - 1.0), int(outside[-1]), band), 0.0)
     return StepResponse(final, ripple, high - low, settling, max(float(np.max(part)) - 1.0, 0.0))
 
 
