@@ -124,7 +124,7 @@ def is_selected(topic: str, topics: Collection[str] | None) -> bool:
 def parts(
     file: BagFile, topics: Collection[str] | None = None, begin: int = 0, end: int = NEVER
 ) -> Iterator[tuple[Channel, MessageBatch]]:
-    """Messages of each selected topic, some megabytes at a time; at the end the file's own counts are checked.
+    """Messages of each selected channel, some megabytes at a time; at the end the file's own counts are checked.
 
     Parameters
     ----------
@@ -139,15 +139,11 @@ def parts(
     is_part = begin > 0 or end < NEVER
     for found in file.batches(numbers, *times):
         batch = found.of((found.times >= begin) & (found.times < end)) if is_part else found
-        by_topic: dict[str, list[int]] = {}
         for number in np.flatnonzero(np.bincount(batch.channels)).tolist():
             if number not in file.channels:
                 raise Damage(f"a message is on channel {number}, which is not defined")
-            by_topic.setdefault(file.channels[number].topic, []).append(number)
-        for topic, members in by_topic.items():
-            if is_selected(topic, topics):
-                is_own = np.logical_or.reduce([batch.channels == number for number in members])
-                yield file.channels[members[0]], batch.of(np.flatnonzero(is_own))
+            if is_selected(file.channels[number].topic, topics):
+                yield file.channels[number], batch.of(np.flatnonzero(batch.channels == number))
     if file.counts is None or is_part:
         return
     for number, channel in file.channels.items():

@@ -19,7 +19,7 @@ from wam_bag.errors import BagError, Damage
 from wam_bag.message_groups import Decoded, Group, Grouping
 from wam_bag.message_search import DATA, MessageBatch, packed
 from wam_bag.message_text import definitions
-from wam_bag.point_clouds import table_columns, tables
+from wam_bag.point_clouds import points, table_columns
 
 Series = dict[str, NDArray[Any]]
 AXES = ("x", "y", "z")
@@ -182,7 +182,7 @@ class Collector:
 
 
 def _header(group: Group) -> tuple[Times, str]:
-    return group.time("header.stamp"), group.text("header.frame_id")
+    return group.time("header.stamp"), group.value("header.frame_id")
 
 
 def _where(rows: Index) -> slice | Index:
@@ -282,18 +282,19 @@ def joint_columns(times: Times, groups: list[Any]) -> JointColumns:
 
 def _table_columns(times: Times, groups: list[Any]) -> TableColumns:
     rows = np.arange(len(times))
-    found = [table._replace(messages=rows[where][table.messages]) for where, values in groups for table in values[2]]
-    return TableColumns(*_stamped(times, groups), *table_columns(found))
+    return TableColumns(
+        *_stamped(times, groups), *table_columns([(rows[where], every) for where, (*_, every) in groups])
+    )
 
 
 _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
     "sensor_msgs/msg/JointState": (
-        lambda group: (*_header(group), tuple(group.text("name")), list(map(group.numbers, JOINT_FIELDS))),
+        lambda group: (*_header(group), tuple(group.value("name")), list(map(group.numbers, JOINT_FIELDS))),
         joint_columns,
     ),
     "geometry_msgs/msg/WrenchStamped": _vectors(WrenchColumns, "wrench.force", "wrench.torque"),
     "geometry_msgs/msg/PointStamped": _vectors(PointColumns, "point"),
-    "sensor_msgs/msg/PointCloud2": (lambda group: (*_header(group), tables(group)), _table_columns),
+    "sensor_msgs/msg/PointCloud2": (lambda group: (*_header(group), points(group)), _table_columns),
     "std_msgs/msg/Bool": (
         lambda group: (group.numbers("data")[:, 0] != 0,),
         lambda times, groups: BoolColumns(times, _filled(groups, 0, (len(times),), np.bool_)),

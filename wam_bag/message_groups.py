@@ -35,12 +35,12 @@ class Group(NamedTuple):
         begin = 8 + leaf.offset
         return self.words.view(np.uint8)[:, begin : begin + size].view(leaf.dtype)
 
-    def text(self, path: str) -> Any:
-        """String or strings at a path."""
+    def value(self, path: str) -> Any:
+        """What every message has at a path: strings, or a number that is no stamp."""
         try:
             return attrgetter(path)(self.layout.message)
         except AttributeError:
-            raise Damage(f"its type has no strings '{path}'") from None
+            raise Damage(f"its type has no field '{path}'") from None
 
     def time(self, path: str) -> Times:
         """Time at a path, ns, (m,)."""
@@ -62,11 +62,15 @@ class Known(NamedTuple):
 
     @staticmethod
     def of(layout: Reading) -> "Known":
-        """What the messages of this layout have in common: byte order, counts and strings."""
+        """What the messages of this layout have in common: byte order, counts, strings, and integers but stamps."""
         size = len(layout.data)
         width = 8 * _words(size)
         mask, want = np.zeros(width, np.uint8), np.zeros(width, np.uint8)
-        for start, end in ((0, 2), *((place, place + 4) for place, _ in layout.counts_at), *layout.texts_at):
+        fixed = [(0, 2), *((place, place + 4) for place, _ in layout.counts_at), *layout.texts_at]
+        for path, (offset, dtype, length) in layout.numbers_at.items():
+            if dtype.kind in "iu" and length is None and ".stamp." not in path:
+                fixed.append((ENCAPSULATION + offset, ENCAPSULATION + offset + dtype.itemsize))
+        for start, end in fixed:
             mask[BEFORE + start : BEFORE + end] = 255
         want[BEFORE : BEFORE + size] = np.frombuffer(layout.data, np.uint8)
         return Known(size, layout, mask.view(np.uint64), (want & mask).view(np.uint64))

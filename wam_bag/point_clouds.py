@@ -1,12 +1,12 @@
 """Points of sensor_msgs/PointCloud2 as a table: the bytes in each message read as its fields describe them."""
 
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_bag.arrays import Bytes, Index
+from wam_bag.arrays import Index
 from wam_bag.errors import Damage
 from wam_bag.message_groups import Group
 
@@ -14,74 +14,53 @@ TYPES: Final = dict(enumerate(("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"), 
 _SIZES: Final = ("height", "width", "is_bigendian", "point_step", "row_step")
 
 
-class PointTable(NamedTuple):
-    """Points of m messages that have p points each: which messages, and the points, (m, p), with named fields."""
-
-    messages: Index
-    points: NDArray[Any]
-
-
-def tables(group: Group) -> list[PointTable]:
-    """The points of messages of one layout; `messages` are rows of the group.
+def points(group: Group) -> NDArray[Any]:
+    """The points of messages of one layout, (m, p), with named fields.
 
     Raises
     ------
     Damage
-        if the sizes in a message do not fit each other or its data.
+        if the sizes in the messages do not fit each other or their data.
     """
-    names = [field.name for field in group.text("fields")]
-    paths = [*_SIZES, *(f"fields[{i}].{part}" for i in range(len(names)) for part in ("offset", "datatype", "count"))]
-    described = np.hstack([group.numbers(path).astype(np.int64) for path in paths])
-    data = group.numbers("data")
-    found = []
-    rows = np.arange(len(described))
-    while len(rows):  # mostly all have the same description
-        first = described[rows[0]]
-        same = (described[rows] == first).all(axis=1)
-        found.append(PointTable(rows[same], _points(data[rows[same]], names, first.tolist())))
-        rows = rows[~same]
-    return found
-
-
-def _points(data: Bytes, names: list[str], described: list[int]) -> NDArray[Any]:
-    """Bytes of m messages as points, (m, p), from the values of `_SIZES` and the three of each field."""
-    height, width, is_bigendian, step, row_step = described[: len(_SIZES)]
-    fields = [described[i : i + 3] for i in range(len(_SIZES), len(described), 3)]
+    height, width, is_bigendian, step, row_step = map(group.value, _SIZES)
+    fields, data = group.value("fields"), group.numbers("data")
     order = ">" if is_bigendian else "<"
     try:
         # some writers leave the count of a single number 0
-        formats = [(order + TYPES[number], (count,) if count > 1 else ()) for _, number, count in fields]
-        offsets = [offset for offset, _, _ in fields]
+        formats = [(order + TYPES[one.datatype], (one.count,) if one.count > 1 else ()) for one in fields]
+        names, offsets = [one.name for one in fields], [one.offset for one in fields]
         kind = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": step})
         lines = data.reshape(len(data), height, row_step)[:, :, : width * step]
         return np.ascontiguousarray(lines).view(kind).reshape(len(data), height * width)
     except (KeyError, ValueError, OverflowError, ZeroDivisionError) as error:
-        listed = ", ".join(f"{name} {place}" for name, place in zip(names, fields, strict=True))
+        listed = ", ".join(f"{one.name} {[one.offset, one.datatype, one.count]}" for one in fields)
         raise Damage(
             f"a point cloud of {height} rows of {width} points, point_step {step} and row_step {row_step} does not fit "
             f"its {data.shape[1]} bytes of data or its fields (offset, datatype, count): {listed} ({error})"
         ) from None
 
 
-def table_columns(found: Sequence[PointTable]) -> tuple[Index, dict[str, NDArray[Any]]]:
+def table_columns(found: Sequence[tuple[Index, NDArray[Any]]]) -> tuple[Index, dict[str, NDArray[Any]]]:
     """Index of the message and the fields of all points, in the order of the messages.
+
+    Parameters
+    ----------
+    found : indices of messages, (m,), and their points, (m, p), by layout.
 
     Raises
     ------
     Damage
         if messages with points have different fields.
     """
-    filled = [table for table in found if table.points.size] or found[:1]
-    shapes = [{name: table.points[name].shape[2:] for name in table.points.dtype.names or ()} for table in filled]
+    filled = [one for one in found if one[1].size] or found[:1]
+    shapes = [{name: every[name].shape[2:] for name in every.dtype.names or ()} for _, every in filled]
     for other in shapes:
         if other != shapes[0]:
             raise Damage(f"point clouds of one topic have the fields {', '.join(shapes[0])} and {', '.join(other)}")
-    message = np.concatenate(
-        [np.empty(0, np.intp), *(np.repeat(table.messages, table.points.shape[1]) for table in filled)]
-    )
+    message = np.concatenate([np.empty(0, np.intp), *(np.repeat(rows, every.shape[1]) for rows, every in filled)])
     order = np.argsort(message, kind="stable")
     columns = {}
     for name, shape in shapes[0].items() if shapes else ():
-        values = np.concatenate([table.points[name].reshape(-1, *shape) for table in filled])
+        values = np.concatenate([every[name].reshape(-1, *shape) for _, every in filled])
         columns[name] = values.astype(values.dtype.newbyteorder("="))[order]
     return message[order], columns
