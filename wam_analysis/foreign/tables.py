@@ -105,17 +105,16 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     if given.topics or given.commands:
         raise ValueError(f"{path} is a table and has no topics: leave out --topic and --command. {COMMANDS}")
     _require_once(path, [str(title) for title in series])
-    series, given = _with_one_time(series, given)
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     found |= {quantity: [one for one in found[quantity] if one.name in tuple("xyz")] for quantity in WRENCH}
     every = [one for columns in found.values() for one in columns]
-    used = {one.title for one in every} | {"index"}  # which a data frame has
+    title = given.fields.get("stamp", "time")
+    used = {one.title for one in every} | {"index", *title.split(",")}  # a data frame has an index
     for quantity in (*JOINT_FIELDS, *WRENCH):
         if any(one.has_unit for one in found[quantity]):
             units[quantity] = found[quantity][0][:2]
     clock = next((one for one in found["stamp"] if not one.name), None)
-    title = given.fields.get("stamp", "time")
     if clock is None:
         raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
@@ -135,17 +134,6 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     types = {topic: COMMAND if topic.endswith("_command") else "table" for topic in topics}
     types |= {str(one): UNUSED for one in series if str(one) not in used and str(one).strip()}
     return checked(Bag(path, topics, types, {}, {}, dict.fromkeys(topics, len(times))), given), given
-
-
-def _with_one_time(series: Mapping[str, Any], given: TopicMap) -> tuple[Mapping[str, Any], TopicMap]:
-    """A table whose time is in two columns, s and a rest, with one column of it, ns, and a map that has its unit."""
-    title = given.fields.get("stamp", "")
-    parts = title.split(",")
-    if len(parts) != 2 or not all(part in series for part in parts):
-        return series, given
-    times = joined_times(*(_numbers(series[part]) for part in parts))
-    others = {name: column for name, column in series.items() if name not in parts}
-    return {title: times, **others}, given._replace(units={**given.units, "stamp": UNITS["ns"]})
 
 
 def _topics(
@@ -240,6 +228,11 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
         if they are in units of different kinds.
     """
     wanted, _ = _split(given.fields.get(quantity, "time" if quantity == "stamp" else quantity))
+    parts = wanted.split(",")
+    if quantity == "stamp" and len(parts) == 2 and all(part in series for part in parts):
+        return [
+            _Column(*UNITS["ns"], True, "", False, wanted, joined_times(*(_numbers(series[part]) for part in parts)))
+        ]
     found = []
     for title in series:
         whole, unit = _split(str(title))
