@@ -110,6 +110,7 @@ class RunningArm:
     def __init__(self, domain_id: int, folder: Path) -> None:
         self._domain_id, self._folder = domain_id, folder
         self._composition: Composition | None = None
+        self._has_ended = False
         self.fault = ""
         self._expected: set[str] = set()  # topics of which messages may be refused
 
@@ -138,7 +139,7 @@ class RunningArm:
         require_parameters(self.configuration)
         self._composition = Composition(self.configuration, domain_id=self._domain_id)
         self.nodes: dict[str, Any] = self._composition.nodes
-        self.context, self.executor = self._composition.context, self._composition.executor
+        self.executor = self._composition.executor
         self._driver: Any = self.nodes["driver"].driver if "driver" in self.nodes else None
         self._client = StackClient(NAMESPACE, "test", self._composition, self.configuration.shared)
         self._client.follow_statuses()
@@ -173,6 +174,11 @@ class RunningArm:
             self._stream(stamp_in(data))
 
         return take if topic == "joint_states" else kept.append
+
+    @property
+    def context(self) -> Any:
+        """The rclpy context of the stack: a node for `add` is made with it."""
+        return self._require_start().context
 
     # what the arm does
 
@@ -218,9 +224,7 @@ class RunningArm:
 
     def add(self, node: Any) -> Any:
         """Spin a plain rclpy node, too.  Make it with ``context=arm.context``; it ends with the test."""
-        self._require_start()
-        assert self._composition is not None
-        return self._composition.add(node)
+        return self._require_start().add(node)
 
     def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
         """Spin until a condition holds; it is checked once per outer period of the arm.
@@ -392,8 +396,7 @@ class RunningArm:
             self.start(configuration=playing(steps, self._folder, **start))
         elif steps or start or "scenario" not in self.configuration.shared.nodes:
             raise ValueError("the arm has been started already; call play instead of start, with its arguments")
-        assert self._composition is not None
-        failure = self._composition.play()
+        failure = self._require_start().play()
         self.close()
         if failure:
             raise ArmFault(failure)
@@ -404,11 +407,14 @@ class RunningArm:
         """Destroy all nodes, the driver first, the recorder last."""
         if self._composition is not None:
             self._composition.close()
-            self._composition = None
+            self._composition, self._has_ended = None, True
 
-    def _require_start(self) -> None:
+    def _require_start(self) -> Composition:
         if self._composition is None:
+            assert not self._has_ended, "the stack of this test has ended; read the bag that play returned"
             self.start()
+        assert self._composition is not None
+        return self._composition
 
 
 def _source(condition: Callable[[], Any]) -> str:

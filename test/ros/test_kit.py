@@ -223,6 +223,13 @@ def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text:
         arm.start(**values)
 
 
+def test_a_stack_that_has_ended_has_no_truth_and_is_not_started_again(arm: RunningArm) -> None:
+    assert arm.context.ok()  # asking for it starts the stack
+    arm.close()
+    with pytest.raises(AssertionError, match="has ended; read the bag"):
+        _ = arm.truth
+
+
 def test_a_scenario_that_fails_is_an_exception(arm: RunningArm) -> None:
     with pytest.raises(ArmFault, match="driver refuses"):
         arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])
