@@ -176,7 +176,7 @@ setup(
         # the documentation site: `make docs`
         "docs": ["furo", "myst-parser", "numpydoc", "sphinx>=8.2"],
         # the fixture `arm` in tests of your nodes
-        "kit": ["pytest<9"],
+        "kit": ["pytest<9", "pytest-xdist"],
         # the live page in the browser: `wam live`; without an upper limit pip takes 0.2, which has no plots
         "live": ["viser>=1.1,<1.2"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
