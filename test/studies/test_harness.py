@@ -17,7 +17,7 @@ from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import parameter
 from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load
-from wam_studies.page import block, report, section_of, with_section
+from wam_studies.page import block, kept_rows, report, section_of, with_section
 from wam_studies.scores import (
     ANY,
     FEW,
@@ -119,6 +119,8 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
     file.write_text(file.read_text() + "\n## Method\n\nBy hand.\n")
     file.write_text(with_section(file, "square", "nothing"))
     assert section_of(file, "square") == "nothing\n"
+    assert kept_rows("nothing") == {}
+    assert kept_rows(text)["largest"][:4] == ["largest", "m", "≤5", ""]
     assert file.read_text().endswith("## Method\n\nBy hand.\n")
     with pytest.raises(ValueError, match="has no line '<!-- written: other -->'"):
         with_section(file, "other", "")
