@@ -14,6 +14,7 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
+from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build, fields, given_once, listed, nested
 from wam_description.thresholds import FILES
 
@@ -103,10 +104,13 @@ class Configuration(NamedTuple):
             if the configuration has no such parameter.
         """
         sections = {name: dict(flat) for name, flat in self.sections.items()}
+        has_own = any(":" in str(entry) for entry in sections.get(SHARED, {}).get("nodes", []))
         for key, value in values.items():
             node, colon, parameter = key.rpartition(":")
             flat = sections[self._section(node) if colon else SHARED]
-            if parameter not in flat and (colon or parameter not in _NOT_REQUIRED):
+            # a node of your own, whose class is not known here, refuses what it does not have
+            is_open = has_own and node not in NODES if colon else parameter in _NOT_REQUIRED
+            if parameter not in flat and not is_open:
                 where = f"node '{node}'" if colon else "section '/**'"
                 meant, groups = self._meant(key), sorted({re.sub(r"\..*", ".*", name) for name in flat})
                 raise ParameterError(

@@ -70,6 +70,13 @@ def test_a_number_in_place_of_a_list_is_each_of_its_values() -> None:
     assert WAM.with_values({"force_loop:force_gain": "abc"}).sections["force_loop"]["force_gain"] == "abc"
 
 
+def test_a_node_of_your_own_may_have_more_parameters_than_the_file() -> None:
+    own = WAM.with_sections({"/**": {"nodes": ["driver", "mine:Own"]}, "own": {"gain": 1.0}})
+    assert own.with_values({"own:optional": 2.0}).sections["own"] == {"gain": 1.0, "optional": 2.0}
+    with pytest.raises(ParameterError, match="node 'driver' has no parameter 'sed'"):
+        own.with_values({"driver:sed": 2})
+
+
 def test_sections_cannot_be_written(file: Path) -> None:
     with pytest.raises(TypeError):
         Configuration.load(file).sections["loop"]["gain"] = 1.0  # type: ignore[index]
