@@ -54,9 +54,13 @@ class Amplifier:
 
     def reset(self) -> None:
         """Let the motors be cold and without a current."""
-        zero = [0.0] * len(self.peak)
-        self.heat, self._flowing = zero.copy(), zero
-        self._waiting = deque([zero] * self._parameters.delay)
+        self.heat = [0.0] * len(self.peak)
+        self.cut()
+
+    def cut(self) -> None:
+        """End every current at once, as the brakes do, and those that wait."""
+        self._flowing = [0.0] * len(self.peak)
+        self._waiting = deque([self._flowing] * self._parameters.delay)
 
     def step(self, currents: Sequence[float], dt: float) -> list[float]:
         """Actual currents over `dt` seconds, A, (n,), for the commanded currents, A, (n,)."""
@@ -80,7 +84,7 @@ class Amplifier:
 
     def _followed(self, currents: Sequence[float], dt: float) -> list[float]:
         """Currents of a loop with a delay and a lag, A, (n,), at the end of `dt`."""
-        self._waiting.append(list(currents))
+        self._waiting.append([min(max(i, -peak), peak) for i, peak in zip(currents, self.peak, strict=True)])
         wanted, bandwidth = self._waiting.popleft(), self._parameters.bandwidth
         left = exp(-2.0 * pi * bandwidth * dt) if bandwidth else 0.0
         self._flowing = [to + left * (now - to) for to, now in zip(wanted, self._flowing, strict=True)]

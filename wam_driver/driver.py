@@ -152,6 +152,7 @@ class Driver:
         self._command = self._zero
         self._command_tick = self._tick
         self.currents = self._zero
+        self.amplifier.cut()
         self._pulls: list[list[float]] = []  # N m, of each cable since the last check, so that no short peak is missed
         self.warnings = []
 

@@ -39,9 +39,6 @@ def enabled(**values: Any) -> Driver:
     return hardware
 
 
-# configurations
-
-
 @pytest.mark.parametrize(
     ("values", "text"),
     [
@@ -98,9 +95,6 @@ def test_a_step_that_does_not_fit_is_refused_and_the_one_it_names_is_taken(
     substeps = factor * configuration.shared.timing.substeps
     if substeps <= 1000:
         driver(configuration, **values, timing__substeps=substeps)
-
-
-# pushes and failures of the simulation
 
 
 def test_a_message_without_a_push_ends_those_of_messages_and_not_that_of_the_program() -> None:
@@ -168,9 +162,6 @@ def test_a_simulation_that_fails_is_a_fault_with_brakes_and_a_finite_state(
     for _ in range(20):
         hardware.advance(0.0)
     assert hardware.plant.q == pytest.approx(list(ARM.joints.start), abs=1e-6)
-
-
-# limits that the driver watches
 
 
 PUSHED = r"push less, or " + re.escape(LESS)
@@ -246,9 +237,6 @@ def test_an_arm_that_is_driven_into_a_stop_is_stopped() -> None:
         if hardware.safety.mode is Mode.FAULT:
             break
     assert hardware.safety.fault.startswith("travel of joint4 from the middle of its range is 2.0")
-
-
-# commands of the force loop
 
 
 OWN = WAM.node("force_loop", ForceLoopParameters)

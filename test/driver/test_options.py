@@ -107,12 +107,13 @@ def test_current_follows_after_delay_and_lag(bandwidth: float, delay: int) -> No
     slow = dataclasses.replace(GIVEN.amplifier, bandwidth=bandwidth, delay=delay)
     amplifier = Amplifier(WAM.motors, slow, np.random.default_rng(0))
     for _ in range(2):
-        found = [amplifier.step([1.0, 0.0, -2.0, 0.0], 1e-3) for _ in range(10)]
+        found = [amplifier.step([1.0, 1e3, -2.0, 0.0], 1e-3) for _ in range(10)]
         rate = 2e-3 * math.pi * bandwidth if bandwidth else math.inf
         expected = [1.0 - math.exp(-rate * (k - delay)) if k > delay else 0.0 for k in range(1, 11)]
         assert [row[0] for row in found] == pytest.approx(expected)
         assert [row[2] for row in found] == pytest.approx([-2.0 * value for value in expected])
-        amplifier.reset()
+        assert [row[1] for row in found] == pytest.approx([amplifier.peak[1] * value for value in expected])
+        amplifier.cut()
 
 
 @pytest.mark.parametrize("drop", [0.0, 0.3])
