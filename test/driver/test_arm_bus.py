@@ -103,6 +103,7 @@ class Rig:
 def test_the_arm_starts_and_follows_torques_with_any_firmware(name: str, version: int) -> None:
     rig = Rig(name, version)
     assert rig.start() == [Wait.WAKE, Wait.ACTIVATE]
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.05)
     rig.run(0.1)
     assert not any(rig.bus.commanded)
     rig.run(0.4)
@@ -213,13 +214,18 @@ def test_idle_motors_let_the_arm_sink_slowly() -> None:
     assert 0.01 < max(speeds) < 0.6
 
 
-def test_lost_frames_are_counted_and_no_fault_while_they_are_rare() -> None:
+def test_lost_and_late_frames_are_no_fault_while_they_are_rare_nor_taken_for_others() -> None:
     rig, draw = Rig(), random.Random(47)
     rig.enable()
-    rig.bus.on_line = lambda frame: [] if draw.random() < 0.02 and frame.sender else [frame]
-    rig.run(0.2)
-    assert rig.arm.trouble is None
+    for share, seconds in ((0.02, 0.15), (1.0, PERIOD), (0.0, 0.0)):
+        rig.bus.on_line = lambda frame, share=share: [] if draw.random() < share and frame.sender else [frame]
+        rig.run(seconds)
     assert rig.arm.counts["lost replies"] > 0
+    each = enumerate(rig.plant.theta, 1)
+    rig.bus._queue.extend(frames.position(at, round(angle / math.tau * 4096)) for at, angle in each)
+    rig.run(0.03)
+    assert rig.arm.trouble is None
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=1e-3 * max(map(abs, rig.plant.thetad)))
 
 
 Inject = Callable[[Rig, random.Random], None]

@@ -140,7 +140,7 @@ def test_the_driver_of_a_real_arm_states_what_a_person_has_to_do_and_which_fault
     assert "put the arm at its home pose" in driver.enable().message
     assert driver.hardware.confirm_home()
     wait_for("press Shift-Activate", Level.WARN)
-    assert driver.hardware.is_running
+    ros.wait(lambda: driver.hardware.is_running)
     assert not driver.health.is_ready, "a scenario waits"
     bus.switch(SafetyMode.ACTIVE)
     ros.wait(lambda: not driver.unready and driver.health.is_ready)

@@ -1,5 +1,6 @@
 """The driver of the arm on its bus, one call per period, without ROS; its clock is that of the line."""
 
+import math
 from collections.abc import Sequence
 
 from wam_description.arm import Arm
@@ -53,8 +54,8 @@ class ArmBus:
 
     @property
     def is_running(self) -> bool:
-        """Whether the start-up has ended, so that positions are known."""
-        return self._cycle is not None
+        """Whether the start-up has ended, and all positions are known."""
+        return self._cycle is not None and not any(map(math.isnan, self.state.position))
 
     @property
     def state(self) -> State:

@@ -1,5 +1,6 @@
 """What is sent and taken in each period once the arm is started."""
 
+import math
 from collections.abc import Collection, Sequence
 
 from wam_description.event import Value
@@ -33,6 +34,7 @@ class Cycle:
         self.safety_mode: int = SafetyMode.IDLE
         self._patience = BUS.collect * period + host.line.slack
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
+        self._lost_at = -math.inf  # s, when a position did not come in time
         self._torque, self._mode = host.number(BusGroup.MOTORS, "T"), host.number(BusGroup.MOTORS, "MODE")
         # the pendant first: it states why the mode changes
         requested = (SAFETY, "PEN"), (SAFETY, "MODE"), (BusGroup.MOTORS, "MODE"), (BusGroup.MOTORS, "P")
@@ -65,6 +67,12 @@ class Cycle:
             self.brake(True)  # in every period, as one may not have arrived
         if host.now() >= self._poll_at:
             self._poll()
+        for _ in range(BUS.most_frames):
+            if (late := host.line.receive(0.0)) is None:
+                break
+            # a position that was awaited before is no answer to this request
+            if late.identifier not in self._by_answer or host.now() - self._lost_at > BUS.silent:
+                self._take(late)
         host.send(self._requests[-1])
         requested, awaited = host.now(), self._by_answer.copy()
         for _ in range(BUS.most_frames):
@@ -116,6 +124,7 @@ class Cycle:
     def _judge(self, awaited: Collection[Motor]) -> None:
         """Look for motors whose positions have not come for too long."""
         self._host.counts["lost replies"] += len(awaited)
+        self._lost_at = self._host.now()
         for motor in awaited:
             motor.missed += 1
         silent = [motor for motor in awaited if motor.missed * self._period >= BUS.silent]

@@ -18,7 +18,7 @@ class Motor:
 
     Attributes
     ----------
-    position, velocity : rad, rad/s.
+    position, velocity : rad, rad/s; a position that is not known yet is NaN.
     current : that was sent, A.
     missed : periods since the last position, as the cycle counts them.
     has_jumped : whether one was dropped since then.
@@ -26,7 +26,7 @@ class Motor:
 
     def __init__(self, node: int, turn: int, gain: float, limit: int) -> None:
         self.node, self._step, self._gain, self._limit = node, math.tau / turn, gain, limit
-        self.position = self.velocity = self.current = 0.0
+        self.position, self.velocity, self.current = math.nan, 0.0, 0.0
         self.missed, self.has_jumped = 0, False
         self._time = math.nan  # s, of the last position
 
