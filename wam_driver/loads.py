@@ -186,10 +186,11 @@ class CoverLoads:
 def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     """All forces on a cover as one load, at their mean position weighted by force; None if there is no force."""
     weights = [math.sqrt(part.force.dot(part.force)) for part in parts]
-    whole = sum(weights, 0.0)
-    if not whole > 0.0:
+    if not sum(weights) > 0.0:
         return None
-    place = sum((w * part.position for w, part in zip(weights, parts, strict=True)), 0.0) / whole
+    # a force along the tube is anywhere, a torque alone nowhere
+    placed = [(w, one.position) for w, one in zip(weights, parts, strict=True) if w and not math.isnan(one.position)]
+    place = sum((w * x for w, x in placed), 0.0) / sum((w for w, _ in placed), 0.0) if placed else math.nan
     force, moment = reduce(add, (part.force for part in parts)), reduce(add, (part.moment for part in parts))
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
 
