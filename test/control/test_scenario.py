@@ -113,6 +113,8 @@ def test_a_force_rises_from_that_of_the_step_before_in_its_own_frame() -> None:
     assert [force.force[2] for force in found[:40:10]] == pytest.approx([0.0, -2.0, -4.0, -8.0])
     assert found[50].force == pytest.approx((0.0, 3.0, 0.0))
     assert found[50].torque == pytest.approx((0.0, 0.0, 0.6))
+    early = Scenario([steps[0]._replace(until_force=1.0), *steps[1:]])
+    assert (play(early, 6) + play(early, 1, contact=touching(1.0)))[-1].force.force[2] == pytest.approx(-1.2)
     with pytest.raises(ParameterError, match="rise is 2 s; allowed: 0 to 1 s"):
         Scenario([ScenarioStep("press", 1.0, force=PRESS, rise=2.0)], SHARED)
 
@@ -360,9 +362,6 @@ def test_whoever_enables_the_arm_a_scenario_may_command_it_and_push_it_braked() 
     run = Simulation(CONFIGURATION, steps)
     assert run.driver.safety.enable("").success
     assert run.play() == ""
-
-
-# chirps and settings
 
 
 def test_a_force_with_a_place_is_commanded_with_the_torque_that_pins_it(tmp_path: Path) -> None:

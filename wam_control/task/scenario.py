@@ -242,9 +242,9 @@ class Scenario:
     def _begin(self, index: int, q: Sequence[float]) -> None:
         """Begin a step; where its motion is not possible, the scenario fails before it moves."""
         before = self.steps[self._index] if self._index >= 0 else None
+        self._before = self._force(before) if before else NO_FORCE
         self._index, self._elapsed = index, 0.0
         step = self.steps[index]
-        self._before = before.force if before else NO_FORCE
         rests = not step.commands_arm
         has_pressed = before is not None and (before.presses or (before.until_force > 0.0 and rests))
         if has_pressed and (step.moves or rests):
