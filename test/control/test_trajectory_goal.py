@@ -3,13 +3,16 @@
 from itertools import count
 
 import pytest
-from arms import SHARED, WAM
+from arms import CONFIGURATION, SHARED, WAM
 
+from wam_control.force.force_loop_node import ForceLoopNode
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.motion import PostureMotion
 from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
 from wam_control.thresholds import MOTION
 from wam_description.parameters import ParameterError
 from wam_description.signals import PathPoint, PosturePath, State
+from wam_description.wiring import Inputs
 
 START = (0.0, -0.8, 0.0, 0.3)
 GOAL = (0.2, -0.9, 0.0, 0.5)
@@ -105,3 +108,13 @@ def test_it_waits_until_the_arm_is_at_rest() -> None:
     assert waiting.desired is None
     assert waiting.time == 0.0
     assert follow(waiting)[0].code is GoalCode.SUCCESSFUL
+
+
+def test_a_streamed_trajectory_begins_as_the_brakes_are_released() -> None:
+    given = CONFIGURATION.node("force_loop", ForceLoopParameters)
+    first, late = (ForceLoopNode(SHARED, given) for _ in range(2))
+    for effort in [0.0] * 100 + [1.0] * 100:
+        joints = State(list(START), [0.0] * 4, [effort] * 4)
+        inputs = Inputs.of(1, PERIOD, {"joint_states": (1, joints), "joint_trajectory": (1, PATH)})
+        found = late.step(inputs)["joint_velocity_command"]
+        assert not effort or found == first.step(inputs)["joint_velocity_command"]

@@ -95,8 +95,9 @@ class ForceLoopNode:
         }
 
     def _on_trajectory(self, inputs: Inputs) -> State | None:
-        """The posture on a trajectory, None where the arm is to stay where it is."""
-        trajectory, joints = inputs["joint_trajectory"], inputs["joint_states"]
+        """The posture on a trajectory, which begins as the brakes are released; None: the arm stays where it is."""
+        joints = inputs["joint_states"]
+        trajectory = inputs["joint_trajectory"] if any(joints.effort) else None
         moving = self._player.step(trajectory, joints.position, joints.velocity, inputs.dt)
         return State(moving.position, moving.velocity, []) if moving else None
 
