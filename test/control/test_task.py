@@ -141,16 +141,16 @@ def test_the_posture_never_moves_along_an_axis() -> None:
     assert abs(moved[1]) > 0.05
 
 
-@pytest.mark.parametrize(("stiffness", "damping"), [(400.0, 100.0), (0.0, 200.0)])
-def test_an_impedance_yields_as_its_spring_and_its_damper_do(stiffness: float, damping: float) -> None:
+@pytest.mark.parametrize(("stiffness", "damping", "place"), [(400.0, 100.0, PLACE), (0.0, 200.0, None)])
+def test_an_impedance_yields_as_its_spring_and_its_damper_do(stiffness: float, damping: float, place: Any) -> None:
     world = Springs()
     lever = world.lever(Y)
-    task = base(TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, 0.0, stiffness, damping))
+    task = base(TaskAxis(AxisKind.IMPEDANCE, -1, COVER, place, Y, None, 0.0, stiffness, damping))
     world.step(task, 10)
     start = float(np.array(Y) @ BODY.point(world.q, COVER, (PLACE, 0.0, 0.0)))
     for _ in range(200):
         world.hand = 4.0 * world.lever(Y)
-        world.step(task)
+        world.step(task, contact=Contact(COVER, PLACE, Y))
     moved = float(np.array(Y) @ BODY.point(world.q, COVER, (PLACE, 0.0, 0.0))) - start
     drive = 4.0 - OWN.task.deadband
     expected = drive / stiffness * (1.0 - math.exp(-stiffness / damping)) if stiffness else drive / damping

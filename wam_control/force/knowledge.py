@@ -66,7 +66,7 @@ class Knowledge(NamedTuple):
     def _whole(self, q: Angles, axis: CommandedAxis) -> Belief:
         """What is known of a force, with the errors that the whole commanded force will have."""
         known, place = self._as_placed(axis), axis.place
-        if place is None or place.is_pinned or known.force >= axis.desired or place.is_touched:
+        if place is None or place.is_pinned or place.is_touched or not axis.desired or known.force >= axis.desired:
             return known
         if abs(float(axis.direction.dot(self.forces.link_axis(q, place.cover)))) > STEEPEST:
             return known  # nor will it be known
