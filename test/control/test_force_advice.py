@@ -32,12 +32,12 @@ def radial(q: Sequence[float], newtons: float, frame: str) -> tuple[float, float
 
 
 def asked(own: ForceLoopParameters, q: Sequence[float], frame: str, force: tuple[float, ...], sd: float) -> Event:
-    """The event of a force that is commanded in free space for some time."""
+    """The event of a force that is commanded in free space for some time, after a tenth of it."""
     loop = force_loop(ARM, own)
     joints, sensors = State(list(q), STILL, DRIVEN), State(list(q), STILL, BODY.gravity_torque(q).tolist())
     x, y, z = force
-    for _ in range(LONG):
-        command = ForceCommand(frame, (x, y, z))
+    for part in [0.1] * LONG + [1.0] * LONG:
+        command = ForceCommand(frame, (part * x, part * y, part * z))
         loop.step(ForceInput(joints, DT, sensors, NO_CONTACT, STILL, [sd] * 4 if sd else None, command))
     return loop.event
 

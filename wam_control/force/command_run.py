@@ -165,7 +165,7 @@ class CommandRun:
     delayed : speeds along the axes that are still to come, m/s or rad/s.
     motions : what is reported of the motions along the axes, or of the joints in a posture.
     friction : that is fed forward, N m at the joints (n,), filtered.
-    search, ways : what would help a refused force: still to be tried, and found.
+    search, ways, sought : what would help a refused force: still to be tried, and found; of which command.
     """
 
     def __init__(
@@ -192,6 +192,7 @@ class CommandRun:
         self.friction = LowPass()
         self.search: Iterator[Ways] | None = None
         self.ways: Ways = {}
+        self.sought: TaskCommand | None = None
 
     def go_on(self, before: "CommandRun") -> None:
         """Of axes that were commanded before, keep where they touch and hold, and with what they press."""

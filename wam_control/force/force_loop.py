@@ -466,8 +466,10 @@ class ForceLoop:
         """With what would help a refused force, which is looked for over several periods."""
         run = self._run
         is_one = len(run.axes) == 1 and not run.axes[0].now.is_joint
-        if not is_one or task is None or not any(event.holds and event.cause == "error" for event in found):
-            run.search, run.ways = None, {}
+        is_refused = is_one and any(event.holds and event.cause == "error" for event in found)
+        if not is_refused or task != run.sought:  # what helps another force need not help this one
+            run.search, run.ways, run.sought = None, {}, task
+        if not is_refused or task is None:
             return found
         places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)]
         run.search = run.search or tries(
