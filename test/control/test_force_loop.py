@@ -165,6 +165,11 @@ def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> No
         assert out.velocity == []
         assert out.effort == pytest.approx(lever(POSE, force), abs=1e-6)
     assert ask(loop, World()).velocity == []
+    loop = force_loop(ARM, OWN)
+    for mode in [*["hybrid"] * 50, "open_loop", "hybrid"]:
+        loop.tune(replace(limited(joint_acceleration=1.0), mode=mode))
+        out = ask(loop, World(), posture=[angle + 0.5 for angle in POSE])
+    assert max(map(abs, out.velocity)) <= 1.0 * DT, "it goes on from the velocity of the arm"
 
 
 def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:

@@ -179,7 +179,7 @@ class ForceLoop:
         self._find_axes(task, contact)
         if own.mode == "open_loop" and given.task is None:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(self._q)))
-            self.events = ()
+            self.events, self._velocity = (), np.array(joints.velocity)
             return ForceOutput([], effort.tolist(), frame=self._run.frame)
         if given.rate and admitted.posture != given.posture:
             given = given._replace(rate=None)
