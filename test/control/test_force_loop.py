@@ -114,9 +114,6 @@ def moved(loop: ForceLoop, world: World, force: float | None = None, periods: in
     return out
 
 
-# --- the law of the thesis
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [200.0, 800.0])
 def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) -> None:
@@ -207,9 +204,6 @@ def test_a_share_of_the_dry_friction_is_fed_forward_along_the_commanded_motion(s
     assert not any(ask(force_loop(ARM, none), World(force=2.0), 8.0).effort), (
         "a free arm would be thrown at the surface"
     )
-
-
-# --- posture
 
 
 def test_posture_moves_nothing_along_the_force() -> None:
@@ -309,9 +303,6 @@ def test_a_command_that_has_no_effect_is_refused() -> None:
         assert set(loop.refusals) == refused
 
 
-# --- what is reported
-
-
 LATE = 200  # periods of the settling time
 TIME = np.arange(0.0, 4.0 * LATE * DT, DT)
 
@@ -400,9 +391,6 @@ def test_with_the_brakes_nothing_moves_and_nothing_is_late() -> None:
     assert loop.event.code is Code.NONE
 
 
-# --- limits and doubt
-
-
 @pytest.mark.parametrize(("place", "chance", "wound"), [(0.002, 0.99, 0.0), (0.002, 0.5, 3.0), (PLACE, 0.01, 3.0)])
 def test_a_force_that_may_be_that_of_another_link_is_refused(place: float, chance: float, wound: float) -> None:
     """At the elbow either link gives the torques, in the middle none but this one; the velocity loops wind up to it."""
@@ -480,9 +468,6 @@ def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() ->
     assert loop.event.holds
     assert loop.event.values["part"] == "resting"
     assert out.velocity == pytest.approx(STILL)
-
-
-# --- where the force acts, and what counts as zero
 
 
 def rotation(cover: str) -> np.ndarray:
@@ -599,9 +584,6 @@ def test_missing_sensors_count_as_no_force() -> None:
     assert all(math.isfinite(value) for value in (*out.velocity, *out.effort))
 
 
-# --- a force along another axis begins as in a new loop
-
-
 Period = tuple[float, float, str, Contact, bool]  # turn, N along DOWN, link it is on, estimate, commanded
 ON_OUTER = Contact("outer_link", 0.28, (0.0, 5.0, 0.0), 0.001, 0.99)
 ON_INNER = Contact("inner_link", 0.3, (0.0, 8.0, 0.0), 0.001, 0.99)
@@ -675,11 +657,11 @@ def test_a_force_in_another_frame_begins_as_in_a_new_loop(
         assert one.effort == pytest.approx(other.effort, abs=1e-12)
 
 
-# --- parameters
-
-
 def test_feedback_of_sensors_that_are_not_mounted_is_refused() -> None:
     bare = CONFIGURATION.with_values({"arm.joint_sensors": False}).shared.arm
     with pytest.raises(ParameterError, match=r"arm\.joint_sensors is false; use 'contact_estimate'"):
         force_loop(bare, OWN)
     force_loop(bare, replace(OWN, feedback="contact_estimate"))
+    timing = replace(CONFIGURATION.shared.timing, dither_cycle=10)
+    with pytest.raises(ParameterError, match=r"dither_cycle is 10: .* two outer periods or less; allowed: .* above 10"):
+        ForceLoop(bare, CONFIGURATION.shared.servo, replace(OWN, feedback="contact_estimate"), timing)

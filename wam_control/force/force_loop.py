@@ -43,6 +43,7 @@ from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, warning
+from wam_description.parameters import require
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import BASE, NO_CONTACT, ZERO, Contact, ForceCommand, Triple
 
@@ -113,9 +114,15 @@ class ForceLoop:
             where values do not fit each other or the arm, or the guard does not accept the set; nothing has
             changed then.
         """
-        arm = self._body.arm
+        arm, timing = self._body.arm, self._timing
         parameters.require_fit(arm)
-        self.supervision = Supervision(arm, self._servo, self._timing, parameters, tuple(self._q))
+        fastest = 2 * timing.outer_divisor
+        require(
+            not (parameters.is_estimated and 0 < timing.dither_cycle <= fastest),
+            f"timing.dither_cycle is {timing.dither_cycle}: feedback 'contact_estimate' sees no swing of two outer "
+            f"periods or less; allowed: 0, or above {fastest}",
+        )
+        self.supervision = Supervision(arm, self._servo, timing, parameters, tuple(self._q))
         self.parameters = self.supervision.parameters
         self._axes = TaskAxes(self._body, ForceAxes(self._body, parameters.sensing_fed_back))
 
