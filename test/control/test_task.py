@@ -158,6 +158,17 @@ def test_an_impedance_yields_as_its_spring_and_its_damper_do(stiffness: float, d
     assert lever @ lever > 0.0
 
 
+def test_an_impedance_is_slowed_by_the_factor_of_the_guard() -> None:
+    world, own = Springs(), replace(GIVEN, task=replace(GIVEN.task, least_damping=5.0))
+    world.loop = ForceLoop(WAM, SHARED.servo, own, SHARED.timing)
+    for _ in range(100):
+        world.hand = 2.0 * world.lever(Y)
+        out = world.step(base(TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, damping=5.0)))
+    factor, speed = world.loop.supervision.factor, float(world.lever(Y) @ out.velocity)
+    assert factor < 0.9
+    assert speed == pytest.approx(factor * (2.0 - own.task.deadband) / 5.0, rel=0.02)
+
+
 def impedance(along: Triple, value: float | None = None, stiffness: float = 400.0) -> TaskAxis:
     return TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, along, value, 0.0, stiffness, 100.0)
 

@@ -375,7 +375,8 @@ class ForceLoop:
                 one.side = -one.side  # an impedance may be pushed from either side
             drive = axis.of.stiffness * (axis.side * goal - axis.at) - known.force
             yielding = math.copysign(max(abs(drive) - band, 0.0), drive)
-            speed = axis.side * axis.of.rate + yielding / own.task.damping(axis.of)
+            factor = 1.0 if axis.is_joint else self.supervision.factor  # of joints alone nothing is assessed
+            speed = axis.side * axis.of.rate + factor * yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
     def _force_speed(self, one: AxisRun, dt: float) -> float:
