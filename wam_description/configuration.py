@@ -283,7 +283,8 @@ def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]
             reason = str(error).partition("\n")[0]
             shown = repr(value if len(value) <= FILES.longest_value else f"{value[: FILES.longest_value]}...")
             raise ParameterError(f"{option} {name.strip()}: {shown} is no value of YAML: {reason}") from error
-        if found.setdefault(name.strip(), parsed) != parsed:
+        first = found.setdefault(name.strip(), parsed)
+        if first is not parsed and first != parsed:
             raise ParameterError(f"{option} has {name.strip()} twice, with two values; give one of them")
     return found
 
