@@ -119,8 +119,21 @@ class Bag(NamedTuple):
 
     @property
     def mode(self) -> str:
-        """'realtime', 'lockstep' or 'unknown', see `mode_of`."""
-        return mode_of(self.metadata, self.attachments.get(PARAMETERS))
+        """'realtime', 'lockstep' or 'unknown': by the recorder's metadata, else by the parameters of its nodes.
+
+        A recorder that was killed left only the parameters.
+        """
+        parameters = self.attachments.get(PARAMETERS)
+        recorded = self.metadata.get(RECORDING, {}).get("mode")
+        if recorded is not None or parameters is None:
+            return recorded or "unknown"
+        try:
+            nodes = [node["ros__parameters"] for node in safe_yaml.load(parameters).values()]
+            modes = {node.get("timing", {}).get("mode", node.get("timing.mode")) for node in nodes}
+        except (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError):
+            return "unknown"
+        known = sorted(str(mode) for mode in modes - {None})
+        return known[0] if len(known) == 1 else "unknown"
 
 
 def read(
@@ -230,20 +243,3 @@ def with_nodes_of(before: bytes, after: bytes) -> bytes:
     if not (isinstance(nodes, dict) and isinstance(known, dict) and known.keys() - nodes.keys()):
         return after
     return safe_yaml.dump({**known, **nodes}).encode()
-
-
-def mode_of(metadata: Mapping[str, Mapping[str, str]], parameters: bytes | None) -> str:
-    """'realtime', 'lockstep' or 'unknown': by the recorder's metadata, else by the parameters of its nodes.
-
-    A recorder that was killed left only the parameters.
-    """
-    recorded = metadata.get(RECORDING, {}).get("mode")
-    if recorded is not None or parameters is None:
-        return recorded or "unknown"
-    try:
-        nodes = [node["ros__parameters"] for node in safe_yaml.load(parameters).values()]
-        modes = {node.get("timing", {}).get("mode", node.get("timing.mode")) for node in nodes}
-    except (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError):
-        return "unknown"
-    known = sorted(str(mode) for mode in modes - {None})
-    return known[0] if len(known) == 1 else "unknown"

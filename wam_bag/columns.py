@@ -6,7 +6,6 @@ of them, and a column is a view of many records at once.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -95,11 +94,6 @@ class Messages(NamedTuple):
 
     log_time_ns: Times
     messages: Sequence[Any]
-
-    def column(self, path: str) -> NDArray[Any]:
-        """One field of every message, for example 'header.stamp.sec'; shape (k,), or (k, n) of equal arrays."""
-        values = list(map(attrgetter(path), self.messages))
-        return np.array(values, object if values and isinstance(values[0], str) else None)
 
 
 Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | Messages

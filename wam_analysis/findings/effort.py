@@ -26,9 +26,9 @@ def effort_section(recording: AnalysedRecording) -> Section:
     sentences, findings, brief, alone = [], [], [], []
     doubts, wrong = list[str](), list[str]()
     moving = [one for one in states if one.is_joint and not rests(one)]
-    driven = {one.name for one in moving if np.any(np.nan_to_num(one.values.get("effort", 0.0)))}
+    driven = {one.name for one in moving if len(np.unique(np.nan_to_num(one.values.get("effort", 0.0)))) > 1}
     for one in moving:
-        if unlike := contradiction(one) or _limited(one):
+        if unlike := contradiction(one) or limited(one):
             wrong.append(f"{one.label}: {unlike}, so friction and inertia are not computed.")
             continue
         found, lag = friction(one)
@@ -39,8 +39,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            acting = np.nan_to_num(one.values.get("effort", one.name not in driven))
-            if driven and np.any(acting) and one.values.keys() != {"effort"}:
+            acting = np.unique(np.nan_to_num(one.values.get("effort", [0.0, one.name not in driven])))
+            if driven and len(acting) > 1 and one.values.keys() != {"effort"}:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue
@@ -93,15 +93,15 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
     return f"{large}; the model leaves {shown(100.0 * unexplained, '%')} of the effort unexplained"
 
 
-def _limited(source: Source) -> str:
-    """That an effort stays at its bounds for long, which no friction with its noise does; '' where it does not."""
-    effort = source.only("effort").values.get("effort", np.zeros(0))
-    bounds = (float(np.min(effort, initial=math.inf)), float(np.max(effort, initial=-math.inf)))
-    share = float(np.mean(np.isin(effort, bounds) & (effort != 0.0))) if bounds[0] < bounds[1] else 0.0  # 0 is off
+def limited(source: Source, quantity: str = "effort") -> str:
+    """That a quantity stays at its bounds for long, which none with its noise does; '' where it does not."""
+    value = source.only(quantity).values.get(quantity, np.zeros(0))
+    bounds = (float(np.min(value, initial=math.inf)), float(np.max(value, initial=-math.inf)))
+    share = float(np.mean(np.isin(value, bounds) & (value != 0.0))) if bounds[0] < bounds[1] else 0.0  # 0 is off
     if share < SHAFT.limited:
         return ""
-    low, high = (shown(bound, source.units["effort"]) for bound in bounds)
-    return f"the effort is exactly {low} or {high} in {100.0 * share:.0f} % of the messages, as if it was limited"
+    low, high = (shown(bound, source.units[quantity]) for bound in bounds)
+    return f"the {quantity} is exactly {low} or {high} in {100.0 * share:.0f} % of the messages, as if it was limited"
 
 
 def contradiction(source: Source) -> str:

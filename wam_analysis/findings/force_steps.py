@@ -1,27 +1,29 @@
-"""Section about the steps of a commanded force, and the response of the measured one."""
+"""Section about the steps of a commanded force or torque, and the response of the measured one."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.findings.effort import limited
 from wam_analysis.findings.finding import Finding, Section, counted, shown, times
 from wam_analysis.findings.force import fate_words, response_findings
 from wam_analysis.findings.repetition import is_known
-from wam_analysis.foreign.sources import Source, jumps, pieces
+from wam_analysis.foreign.sources import AXES, Source, jumps, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.response import StepResponse, force_response
+from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, SHAFT, STREAM
 from wam_bag.arrays import Numbers
 from wam_theory.verdicts import Verdict
 
-FORCE = ("force.x", "force.y", "force.z")
+FORCE = AXES[:3]
 
 
 class ForceStep(NamedTuple):
-    """A step of a command at a time, s, and its response, N, with the signs of the axis of the change.
+    """A step of a command at a time, s, and its response, N or N m, with the signs of the axis of the change.
 
     What was commanded before is NaN where that was not recorded.
     """
@@ -35,19 +37,18 @@ class ForceStep(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Of the steady force, N."""
+        """Of the steady force or torque."""
         return abs(self.response.final - self.commanded)
 
 
 def _along(measured: Source, command: Source) -> Source:
     """A command of a single axis, which a number may be, on the axis of the measured force that follows it most."""
-    own, known = command.only(*FORCE), measured.only(*FORCE)
-    if len(own.values) != 1 or not known.values:
+    if len(command.values) != 1 or not measured.values:
         return command
-    (value,) = own.values.values()
-    wanted = value[row_at(own.time, known.time)]
-    follows = {axis: abs(force @ (wanted - np.mean(wanted))) for axis, force in known.values.items()}
-    return own._replace(values={max(follows, key=follows.__getitem__): value})
+    (value,) = command.values.values()
+    wanted = value[row_at(command.time, measured.time)]
+    follows = {axis: abs(force @ (wanted - np.mean(wanted))) for axis, force in measured.values.items()}
+    return command._replace(values={max(follows, key=follows.__getitem__): value})
 
 
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
@@ -56,7 +57,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     A step ends where the sender of either goes over to another frame; one from another frame is none.  Axes that are
     not known of both are left out.
     """
-    axes = [axis for axis in FORCE if axis in command.values and axis in measured.values]
+    axes = [axis for axis in measured.values if axis in command.values]
     measured, command = measured.only(*axes), command.only(*axes)
     known = ~command.is_away(measured.time)
     if not axes or not np.any(known):
@@ -99,50 +100,57 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
 
 
 def step_section(recording: AnalysedRecording) -> Section:
-    """Steps of a commanded force, and how the measured one followed."""
+    """Steps of a commanded force or torque, and how the measured one followed."""
     forces, commands = [one for one in recording.states if not one.is_joint], recording.commands
-    steps: list[ForceStep] = []
-    sentences, findings, doubts, followed = [], [], list[str](), set()
-    for one in forces:
-        if (command := recording.command_of(one)) is not None:
-            on_axis = _along(one, command)
+    followed = [(one, command) for one in forces if (command := recording.command_of(one)) is not None]
+    sentences, findings, shows = [], [], []
+    doubts = [
+        f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
+        f"{other.frame}."
+        for one in forces
+        for other in commands
+        if recording.command_of(one) is None and not other.is_joint and not one.shares_frame(other)
+    ]
+    topics = [command.topic for _, command in followed]
+    doubts += [text for one in commands if one.topic in topics and (text := _arrival(one))]
+    for quantity, unit, axes in (("force", "N", FORCE), ("torque", "N m", AXES[3:])):
+        steps: list[ForceStep] = []
+        for one, command in followed:
+            measured, wanted = one.only(*axes), command.only(*axes)
+            on_axis = _along(measured, wanted)
             doubts += [
                 f"{command.topic} has no {axis}, but {axis} of {one.label} follows it most, and is evaluated."
-                for axis in on_axis.values.keys() - command.values.keys()
+                for axis in on_axis.values.keys() - wanted.values.keys()
             ]
-            steps += force_steps(one, on_axis)
-            followed.add(command.topic)
-            continue
-        doubts += [
-            f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
-            f"{other.frame}."
-            for other in commands
-            if not other.is_joint and not one.shares_frame(other)
-        ]
-    doubts += [text for one in commands if one.topic in followed and (text := _arrival(one))]
-    for step in steps:
-        name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
-        response = step.response
-        settled = ", without staying within 5 % of it" * math.isinf(response.settling)
-        settled += ", without a lasting rise in the recording" * math.isnan(response.settling)
-        came = f"a step from {shown(step.before, 'N')}{settled}"
-        sentences.append(f"{name}: {'commanded from the beginning' if math.isnan(step.before) else came}.")
-        if step.swings.verdict in (Verdict.DIVERGED, Verdict.LIMIT_CYCLE):
-            doubts.append(f"{name}: the force {fate_words(step.swings)}.")
-        findings += [
-            Finding(f"{name}: force in the steady state", "N", response.final, step.commanded),
-            *response_findings(name, response),
-            Finding(f"{name}: ripple", "N", response.ripple),
-        ]
-    shows = []
-    if steps:
-        worst = max(steps, key=lambda step: step.error)
-        error, size = shown(worst.error, "N"), shown(worst.commanded, "N")
-        shows.append(f"{counted(len(steps), 'force step')}; the largest steady error is {error} of {size}.")
-    elif not doubts:
+            steps += force_steps(measured, on_axis)
+        for step in steps:
+            name = f"{step.label}, {shown(step.commanded, unit)} at {step.begin:.1f} s"
+            response = step.response
+            settled = ", without staying within 5 % of it" * math.isinf(response.settling)
+            settled += ", without a lasting rise in its last stretch without a gap" * math.isnan(response.settling)
+            came = f"a step from {shown(step.before, unit)}{settled}"
+            sentences.append(f"{name}: {'commanded from the beginning' if math.isnan(step.before) else came}.")
+            if step.swings.verdict in (Verdict.DIVERGED, Verdict.LIMIT_CYCLE):
+                doubts.append(f"{name}: the {quantity} {fate_words(step.swings)}.")
+            findings += [
+                Finding(f"{name}: {quantity} in the steady state", unit, response.final, step.commanded),
+                *response_findings(name, response),
+                Finding(f"{name}: ripple", unit, response.ripple),
+            ]
+        if steps:
+            worst = max(steps, key=lambda step: step.error)
+            error = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
+            shows.append(f"{counted(len(steps), f'{quantity} step')}; the largest steady error is {error}.")
+    if not shows and not doubts:
         hint = "; name the topic of its command with --command" * bool(forces and not followed)
         sentences.append(f"No step of a commanded force was recorded{hint}.")
     doubts += [text for one in forces if (text := _tared(one, recording.command_of(one)))]
+    doubts += [
+        f"{one.label}: {text}."
+        for one in forces
+        for axis, value in one.values.items()
+        if noise(value) and (text := limited(one, axis))
+    ]
     return Section("force", "Force", (*sentences, *doubts), findings, shows, doubts)
 
 

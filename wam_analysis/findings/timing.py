@@ -75,7 +75,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
                 Finding(f"{name}: longest gap between receptions", "s", float(np.max(waits))),
             ]
         if slowest > STREAM.changes * period:
-            wrong.append(f"{name}: the period changes, from {shown(period, 's')} to {shown(slowest, 's')}.")
+            wrong.append(f"{name}: the period changes between {shown(period, 's')} and {shown(slowest, 's')}.")
         if lost:
             wrong.append(f"{name}: {lost} messages missing; longest gap: {shown(gap, 's')}.")
     if recording.is_foreign:

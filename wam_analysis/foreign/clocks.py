@@ -1,7 +1,8 @@
 """Times of messages on one clock: stamps of a clock that was set, never set, or is not that of other topics."""
 
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from wam_analysis.findings.finding import shown
 from wam_analysis.foreign.topic_map import UNITS, TopicMap
 from wam_analysis.thresholds import STREAM
-from wam_bag.arrays import Times
+from wam_bag.arrays import Index, Times
 from wam_bag.bag import JointColumns, WrenchColumns
 
 BILLION = 1_000_000_000
@@ -67,6 +68,12 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
     return np.asarray(np.rint(BILLION * seconds), np.int64)
 
 
+def dates(texts: Iterable[Any]) -> NDArray[Any]:
+    """Times of dates as text, ns since 1970; raises ValueError if one is none."""
+    with warnings.catch_warnings(action="ignore"):  # that numpy turns times of a zone to UTC
+        return np.array([str(one).replace(",", ".") for one in texts], "M8[ns]")
+
+
 def joined_times(seconds: NDArray[Any], rest: NDArray[Any]) -> NDArray[Any]:
     """Times, ns, of whole seconds and a rest, which is less than a second in its unit: ms, us or ns."""
     digits = len(f"{np.nanmax(rest):.0f}")
@@ -84,8 +91,7 @@ def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Cloc
     for topic, columns in topics.items():
         times = rising(columns.stamp_ns, columns.log_time_ns)
         found[topic] = Clock(times, CLOCK_SET * (not np.array_equal(times, columns.stamp_ns)))
-    stamped = [topic for topic, clock in found.items() if not clock.note] or list(found)
-    first = max(stamped, key=lambda topic: len(found[topic].times), default="")
+    first = max(found, key=lambda topic: (not found[topic].note, len(found[topic].times)), default="")
     for topic, columns in topics.items():
         if topic != first:
             reference = found[first].times, topics[first].log_time_ns
@@ -95,57 +101,60 @@ def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Cloc
 
 def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name: str) -> Clock:
     """A clock by that of a reference, whose messages of some times arrived then."""
-    if not len(times) or not len(received) or np.ptp(arrivals) < STREAM.live * np.ptp(times):
+    if np.ptp(arrivals) < STREAM.live * np.ptp(times):
         return clock
     order = np.argsort(arrivals, kind="stable")
-    begin = arrivals[order[0]]
-    age = (arrivals - times)[order]
-    there = np.interp((received - begin).astype(float), (arrivals[order] - begin).astype(float), (age - age[0]) * 1.0)
-    apart = received - clock.times - age[0] - np.rint(there).astype(np.int64)
-    shift = round(float(np.median(apart - apart[0]))) + int(apart[0])
+    there = np.interp(received, arrivals[order], (arrivals - times)[order])
+    apart = received - clock.times - there.astype(np.int64)
+    shift = int(np.median(apart))
     spread = float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05))
     if max(abs(shift), spread) <= STREAM.reset:
         return clock
     side = "behind" if shift > 0 else "ahead of"
     of = "of another clock" if len(received) > 1 else "of another clock, or sent before the recording"
-    note = clock.note or f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as {of}"
-    if spread > STREAM.reset:
-        return Clock(clock.times + apart, clock.note or f"{note}; reception times are used")
-    return Clock(clock.times + shift, clock.note or f"{note}; they are shifted by this")
+    by, done = (apart, "reception times are used") if spread > STREAM.reset else (shift, "they are shifted by this")
+    note = f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as {of}; {done}"
+    return Clock(clock.times + by, clock.note or note)
 
 
 def rising(stamps: Times, received: Times) -> Times:
-    """The stamps, or the times of reception where the stamps are of a clock that was set, reset or never set.
+    """The stamps, or times by reception where the stamps are of a clock that was set, reset or never set.
 
-    A few stamps that are years away from their reception, such as 0, are replaced by it, less the usual delay, and so
-    is that of a first message that waited for the recorder.
+    A few stamps that are years away from their reception, such as 0, or far from those before and after, as that of a
+    first message that waited for the recorder, are replaced by it, less the usual delay.  Of a clock that was set the
+    parts are placed by the usual delay, too.
     """
+    if len(stamps) < 2:
+        return stamps
+    period = np.median(np.diff(stamps))
+    keeps_pace = abs(np.median(np.diff(received)) - period) <= STREAM.pace * period
     age = received - stamps
+    before, here, after = stamps[:-2], stamps[1:-1], stamps[2:]
     away = np.abs(age) > STREAM.away
+    away[0] |= keeps_pace and age[0] - age[1] > STREAM.reset
+    is_far = np.maximum(before - here, here - after) > STREAM.near * period
+    away[1:-1] |= is_far & (after - before > STREAM.changes * period)  # and its own place is empty
     if 2 * np.count_nonzero(away) < len(stamps):
         stamps = np.where(away, received - int(np.median(age[~away])), stamps)
-    steps, arrivals = np.diff(stamps), np.diff(received)
-    if not len(steps):
-        return stamps
-    keeps_pace = abs(np.median(arrivals) - np.median(steps)) <= STREAM.pace * np.median(steps)
-    if keeps_pace and steps[0] > arrivals[0] + STREAM.reset:
-        return rising(np.concatenate([stamps[1:2] - arrivals[:1], stamps[1:]]), received)
-    is_reset = not np.any(steps) or np.any(steps < -STREAM.reset) or (keeps_pace and _is_set(stamps, received))
-    return received if is_reset else stamps
+    if keeps_pace and len(rows := _sets(stamps, received)):
+        parts = np.split(received - stamps, rows + 1)
+        stamps = stamps + np.concatenate([np.full(len(part), int(np.median(part))) for part in parts])
+    steps = np.diff(stamps)
+    return received if not np.any(steps) or np.any(steps < -STREAM.reset) else stamps
 
 
-def _is_set(stamps: Times, received: Times) -> bool:
-    """Whether the stamps go back, or skip periods that the receptions do not, and stay as much older or newer.
+def _sets(stamps: Times, received: Times) -> Index:
+    """Rows after which the stamps go back, or skip periods that the receptions do not, and stay as much older or newer.
 
     A message that was late does so for a moment; delays that change at random do so within their range.
     """
     steps = np.diff(stamps)
     skipped = (steps > STREAM.filled * np.median(steps)) & (steps > STREAM.filled * np.diff(received))
-    rows = np.flatnonzero((steps < 0) | skipped)
-    rows = rows[(rows + 1 >= STREAM.near) & (rows + 1 <= len(stamps) - STREAM.near)]
+    edge = STREAM.near - 1
+    rows = edge + np.flatnonzero(((steps < 0) | skipped)[edge:-edge])
     if not len(rows):
-        return False
+        return rows
     windows = sliding_window_view((received - stamps) - (received[0] - stamps[0]), STREAM.near)
-    before, after = windows[rows + 1 - STREAM.near], windows[rows + 1]
-    apart = np.maximum(np.min(after, axis=1) - np.max(before, axis=1), np.min(before, axis=1) - np.max(after, axis=1))
-    return bool(np.any(2 * apart > np.abs(steps[rows])))
+    before, after = windows[rows - edge], windows[rows + 1]
+    apart = np.maximum(after.min(axis=1) - before.max(axis=1), before.min(axis=1) - after.max(axis=1))
+    return rows[2 * apart > np.abs(steps[rows])]

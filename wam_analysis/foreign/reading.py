@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wam_analysis.foreign.clocks import BILLION, joined_times, nanoseconds
+from wam_analysis.foreign.clocks import BILLION, dates, joined_times, nanoseconds
 from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
@@ -29,7 +29,6 @@ FIELDS = {  # of the types that are known: suffix of the topic, and fields by qu
 }
 COMMAND = "command"
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
-TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
 
 
 def foreign_bag(source: Bag, given: TopicMap) -> Bag:
@@ -164,13 +163,16 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     for whole, rest in PARTS_OF_TIME:
         if hasattr(stamps[0], whole) and hasattr(stamps[0], rest):
             if "stamp" in given.units:
-                raise ValueError(TIME_OF_ROS.format(topic))
+                raise ValueError(f"{topic} has stamps of ROS, in s and ns; --unit stamp is for numbers")
             return np.array([getattr(one, whole) * BILLION + getattr(one, rest) for one in stamps], np.int64)
     numbers = np.array(stamps)
     try:
         numbers = numbers if numbers.dtype.kind in "iu" else numbers.astype(np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{topic}: the field '{path}' has no times") from None
+        try:
+            return dates(stamps).astype(np.int64)
+        except ValueError:
+            raise ValueError(f"{topic}: the field '{path}' has no times") from None
     return nanoseconds(f"{topic}: the field '{path}'", numbers, given, columns.log_time_ns)
 
 

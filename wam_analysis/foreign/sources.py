@@ -3,7 +3,8 @@
 import math
 from collections.abc import Mapping
 from enum import StrEnum
-from itertools import takewhile
+from os.path import commonpath
+from pathlib import PurePath
 from typing import NamedTuple
 
 import numpy as np
@@ -511,8 +512,7 @@ def _labelled(found: list[Source]) -> list[Source]:
 
 def shared_parts(one: Source, other: Source) -> int:
     """How many parts the names of two topics have in common from the beginning."""
-    parts = zip(one.topic.strip("/").split("/"), other.topic.strip("/").split("/"), strict=False)
-    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], parts))
+    return len(PurePath(commonpath([each.topic.strip("/") for each in (one, other)])).parts)
 
 
 def pieces(source: Source, *quantities: str) -> list[Piece]:

@@ -3,7 +3,6 @@
 import csv
 import math
 import re
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.foreign.clocks import joined_times, nanoseconds
+from wam_analysis.foreign.clocks import dates, joined_times, nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
@@ -289,16 +288,15 @@ def _number(text: str) -> float:
 
 def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     """Times of the rows that have one, ns, and which these are: of numbers, or of dates."""
-    dates = np.asarray(column)
-    if dates.dtype.kind in "mM":
-        known = ~np.isnat(dates)
-        return dates[known].astype(f"{dates.dtype.kind}8[ns]").astype(np.int64), known
+    times = np.asarray(column)
+    if times.dtype.kind in "mM":
+        known = ~np.isnat(times)
+        return times[known].astype(f"{times.dtype.kind}8[ns]").astype(np.int64), known
     try:
         numbers = _numbers(column)
     except BagError as error:
         try:
-            with warnings.catch_warnings(action="ignore"):  # that numpy turns times of a zone to UTC
-                return _times(label, np.array([str(one).replace(",", ".") for one in column], "M8[ns]"), given)
+            return _times(label, dates(column), given)
         except ValueError:
             raise BagError(f"{label}: {error}; dates are read as 2026-05-01T12:00:00.5") from None
     known = np.isfinite(numbers)
