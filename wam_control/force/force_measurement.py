@@ -129,8 +129,8 @@ class ForceMeasurement:
         return Zero(0.0, torques)
 
     def tare(self) -> None:
-        """Take the present external torques as zero."""
-        self._tare = self._taken(self._tare.at(self._body, self._q) + self._external)
+        """Take the steady external torques as zero."""
+        self._tare = self._taken(np.array(self._steady.value) - self._zero.at(self._body, self._q))
         self.free = self._zeros
         self.restart()
 
