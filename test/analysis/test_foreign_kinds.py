@@ -101,6 +101,7 @@ def without(sent: list[Sent], lacks: Callable[[int], bool], *fields: str) -> lis
 def sparse() -> list[Case]:
     made = [
         ("every other", by_rosbags, 100.0, lambda i: i % 2, ("velocity", "effort"), 1500),
+        ("three of four", sqlite, 200.0, lambda i: i % 4, ("velocity", "effort"), 1500),
         ("effort alone", ros1, 125.0, lambda i: i % 3 == 1, ("effort",), 2500),
         ("left out in JSON", partial(by_json, kind=JOINTS), 100.0, lambda i: i % 3 != 1, ("velocity", "effort"), 1000),
         ("velocity alone", by_mcap_ros2, 80.0, lambda i: i % 5 == 0, ("velocity",), 1920),
@@ -126,6 +127,8 @@ def stamped(sent: list[Sent], change: Callable[[float], float]) -> list[Sent]:
 def coarse() -> list[Case]:
     made = [
         ("seconds", by_rosbags, 100.0, math.floor),
+        ("centiseconds", sqlite, 250.0, lambda t: round(100.0 * t) / 100.0),
+        ("two of three", ros1, 150.0, lambda t: math.floor(50.0 * t) / 50.0),
         ("read in halves", sqlite, 100.0, lambda t: t - 0.9975 * (round(100.0 * t) % 400 == 250)),
         ("never set", by_mcap_ros2, 50.0, lambda t: -1.7e9),
         ("the first from before", sqlite, 100.0, lambda t: t - 3600.0 * (t == 0.0) + 1e-6 * math.sin(9.0 * t)),
@@ -152,6 +155,7 @@ def twice() -> list[Case]:
         Case("a simulation that stopped", ros1, slow, expected, "the first message of each is used"),
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
         Case("relayed", by_mcap_ros2, sent + relayed, expected, "3000 of 6000 messages repeat the one before"),
+        Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
         Case("less of a part", sqlite, sent + without(again[:1000], bool, "effort"), expected, "the first message of"),
     ]
 
@@ -195,6 +199,7 @@ def names() -> list[Case]:
     return [
         Case("none", by_mcap_ros2, called(), numbers("joint1", "joint2"), "without a name"),
         Case("none, ROS 1, given", ros1, called(), numbers("p", "q"), "", given),
+        Case("empty", by_rosbags, called("", ""), numbers("joint1", "joint2"), "without a name"),
         Case("one of two", sqlite, called("x"), numbers("x", "joint2"), "without a name"),
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
@@ -245,6 +250,7 @@ def called_as_commands() -> list[Case]:
     path = np.sin(np.outer(time, (1.4, 2.6, 5.2, 10.7)) + np.arange(4.0) ** 3) @ [[0.5], [0.3], [0.15], [0.06]]
     return [
         Case("target", by_rosbags, one("/target/joint_states", 100.0, 0.7, 0.5), expected),
+        Case("desired", sqlite, one("/arm_desired/desired", 200.0, 0.7, 0.5), expected),
         Case("goal", ros1, one("/goal/ref", 125.0, 0.7, 0.5), expected, "", named),
         Case("wrench", by_mcap_ros2, wrenches("/cmd/wrench", np.arange(3000) / 100.0, force), cycle),
         Case("at another rate", by_rosbags, joints("/js", time, ["a"], position=path) +
@@ -296,6 +302,7 @@ def still() -> list[Case]:
         Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
              {"a: frequency": 0.3}, "", NOTHING, ("a: moved by 0.00614 rad, more slowly than 0.0939 rad/s, or",)),
         with_flicker(by_rosbags, 1, 1e-4, 0.0),
+        with_flicker(sqlite, 2, 1e-3, 1e-4),
         with_flicker(ros1, 3, 2e-5, 1e-3),
         Case("noise", by_rosbags,
              joints("/s", range(2000), ["a"], position=1e-3 * np.random.default_rng(11).normal(size=(2000, 1))),
@@ -425,6 +432,7 @@ def formats() -> list[Case]:
         Case("JSON of ROS", lambda path, sent: by_json(path, sent, "sensor_msgs/JointState"),
              without(one("/joint_states", 100.0, 0.7, 0.5), lambda _: True, "velocity"), sine(0.7, 0.5) | FRICTION),
         Case("slash of a frame", by_rosbags, frames, step, "", commanded),
+        Case("slash of a frame, SQLite", sqlite, frames, step, "", commanded),
     ]  # fmt: skip
 
 
@@ -552,6 +560,7 @@ TABLES = {
     "no velocity": Written(("time", "position.a", "speed", "effort.a")),
     "renamed": Written(("t", "q.a", "velocity.a", "effort.a"), fields=("stamp=t", "position=q")),
     "units in the titles": Written(WITH_UNITS, OTHER_UNITS),
+    "units, renamed": Written(("t [ms]", *WITH_UNITS[1:]), OTHER_UNITS, fields=("stamp=t [ms]",)),
     "decimal commas": Written(delimiter=";", decimal=","),
     "decimal commas in quotes": Written(decimal=","),
     "separators of thousands": Written(("Time [ms]", *WITH_UNITS[1:]), OTHER_UNITS, ";", times=german),
@@ -561,9 +570,11 @@ TABLES = {
     ),
     "two columns, us": Written(("s", "position.a", "velocity.a", "effort.a", "us"), fields=("stamp=s,us",), times=int),
     "tabs": Written(delimiter="\t"),
+    "bars": Written(delimiter="|"),
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "rounded": Written(times=lambda time: math.floor(time / 0.003) * 0.003),
     "dates": Written(times=date),
+    "dates of a zone": Written(times=lambda time: f"{date(time)}+02:00"),
     "dates of two zones": Written(times=lambda time: f"{date(time)}Z" if time < 9 else f"{date(time - 3600)}-01:00"),
     "hours": Written(("time [h]", *WITH_UNITS[1:]), (3600.0, *OTHER_UNITS[1:])),
     "dates as Python logs them": Written(times=lambda time: date(time).replace("T", " ").replace(".", ",")),

@@ -41,6 +41,7 @@ REFUSED = [
     ("up --config barrett-wam4-bus --scenario barrett-wam4_scenario", "has a push, but the driver of this arm"),
     ("demo --no-live --name ../x", "'name' is '../x'; allowed: a name without directories"),
     ("demo --set arm.payload=.nan", "parameter 'arm.payload' is nan kg; allowed: 0 to 50"),
+    ("demo --set force_loop:force_gain=[-1.0]", "parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
     ("demo --set driver:effects.added_coulomb_friction=[0.5]", "friction' has 1 values; it needs 4"),
     *(
         (f"{words} --set arm.payload=0.5 --set arm.payload=1", "--set has arm.payload twice, with two values")

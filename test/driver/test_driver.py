@@ -395,8 +395,6 @@ def test_reset_of_an_arm_with_real_encoders_reads_no_speed() -> None:
     np.testing.assert_allclose(hardware.joint_sensors.velocity, 0.0, atol=1e-4)
 
 
-# parameters
-
 GROUPS = ("effects.", "friction.", "world.", "amplifier.", "sensors.", "arm.cables.")
 EVERY = [  # every sixth
     (prefix, field)

@@ -35,9 +35,6 @@ def released(arm: Arm, obstacles: Obstacles = NOWHERE, step: float = STEP) -> Pl
     return plant
 
 
-# resonances (4.4)
-
-
 # friction
 
 F_STATIC, F_DYNAMIC = 0.06, 0.045

@@ -399,11 +399,6 @@ def test_several_surfaces_push_on_both_links_each_with_its_own_stiffness() -> No
     np.testing.assert_allclose(held + carried, BODY.gravity_torque(q), atol=1e-3)
 
 
-# stick
-
-
-# energy
-
 BARS = ((0.3, -0.1), (-0.3, -0.1), (0.65, -0.2), (-0.65, -0.2))  # m, x and z of each
 
 

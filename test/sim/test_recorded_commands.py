@@ -112,9 +112,6 @@ def test_without_states_or_parameters_every_command_is_taken() -> None:
     assert recorded_run(bag._replace(topics=topics, attachments={})).refused == ()
 
 
-# several runs
-
-
 def test_two_runs_in_one_recording_are_refused_with_their_times() -> None:
     states = joints(np.concatenate([STATES, STATES[:2000]]), 0.0)
     with pytest.raises(BagError, match=r"2 runs .* motor_states go back \(0\.001 to 3\.999 s, 0\.001 to 2\.000 s\)"):

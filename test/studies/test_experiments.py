@@ -278,9 +278,6 @@ def test_forces_of_the_arm_are_compared_along_the_commanded_one(tmp_path: Path) 
     assert arm_forces.along(run).estimated == pytest.approx(0.0), "a force on another link is not this one"
 
 
-# the page
-
-
 def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
