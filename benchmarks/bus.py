@@ -1,8 +1,10 @@
 """The driver of a real arm on its bus: its cost next to python-can alone, and its late cycles."""
 
+import math
 import time
 from itertools import count
 from statistics import median
+from typing import Any
 
 import can
 from bench import Benchmark, Ratio, Values
@@ -41,37 +43,48 @@ def drain(bus: can.BusABC) -> None:
 
 
 def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
-    """Processor time of a cycle of four controllers, us, and of the bare loop; their answers are sent before."""
-    host, arm = (can.Bus(interface=interface, channel=channel) for _ in range(2))
-    numbers = properties.numbers(FIRMWARE)
-    positions = [message(frames.position(node, 1000 * node)) for node in range(1, 5)]
-    modes = [message(frames.reply(SAFETY, numbers["MODE"], SafetyMode.ACTIVE))]
-    modes += [message(frames.reply(node, numbers["MODE"], 2)) for node in range(1, 5)]
-    modes.append(message(frames.reply(SAFETY, properties.numbers(FIRMWARE, True)["PEN"], 3 << 26)))
-    request = frames.get(BusGroup.MOTORS, numbers["P"])
+    """Processor time of a cycle of four controllers, us, and of the bare loop, without that of their answers."""
+    host, arm = list[Any](can.Bus(interface=interface, channel=channel) for _ in range(2))
+    begin, send = 0, host.send
+    arm_of_start = SimulatedBus(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE)
+    driver = ArmBus(arm_of_start, CONFIGURATION.shared.arm, PERIOD)
+    while not driver.is_running:
+        driver.exchange()
+    numbers, of_safety = properties.numbers(FIRMWARE), properties.numbers(FIRMWARE, True)
+    counts = enumerate((round(angle / math.tau * 4096) for angle in driver.state.position), 1)
+    answers: dict[tuple[int, bytes], list[Frame]] = {
+        frames.get(SAFETY, of_safety["PEN"]): [frames.reply(SAFETY, of_safety["PEN"], 3 << 26)],
+        frames.get(SAFETY, numbers["MODE"]): [frames.reply(SAFETY, numbers["MODE"], SafetyMode.ACTIVE)],
+        frames.get(BusGroup.MOTORS, numbers["MODE"]): [frames.reply(at, numbers["MODE"], 2) for at in range(1, 5)],
+        frames.get(BusGroup.MOTORS, numbers["P"]): [frames.position(at, count) for at, count in counts],
+    }
+    questions = [Frame(*question) for question in answers]
     torques = frames.torques(BusGroup.ARM, numbers["T"], [100, -100, 100, -100])
-    questions = [frames.get(node, numbers["MODE"]) for node in range(3)]
+
+    def answered(question: can.Message, timeout: float) -> None:
+        nonlocal begin
+        send(question, timeout)
+        before = time.thread_time_ns()
+        for answer in answers.get((question.arbitration_id, bytes(question.data)), ()):
+            arm.send(message(answer))
+        begin += time.thread_time_ns() - before
 
     def bare(tick: int) -> None:
-        is_polled = tick % POLL == 0
-        for frame in [*questions * is_polled, request]:
+        missing = 0
+        for frame in questions[0 if tick % POLL == 0 else -1 :]:
             host.send(message(frame), 0.0)
-        missing = len(positions) + len(modes) * is_polled
+            missing += len(answers[frame])
         while missing:
             found = host.recv(0.01)
             missing -= bool(found and found.arbitration_id & SENDER)  # not an echo
         host.send(message(torques), 0.0)
 
-    arm_of_start = SimulatedBus(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE)
-    driver = ArmBus(arm_of_start, CONFIGURATION.shared.arm, PERIOD)
-    while not driver.is_running:
-        driver.exchange()
     clock = count(arm_of_start.now() + PERIOD, PERIOD)
     at = [next(clock)]
     line = CanLine(host, time, 0.1 * (interface == "udp_multicast"))
     own = driver._host
     driver._line = own.line = line
-    own.now = lambda: at[0]
+    host.send, own.now = answered, lambda: at[0]
 
     def driven(tick: int) -> None:
         driver.exchange()
@@ -85,8 +98,6 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
             times.append(0)
             for tick in range(POLL):
                 at[0] = next(clock)
-                for one in [*modes * (tick == 0), *positions]:
-                    arm.send(one)
                 begin = time.thread_time_ns()
                 loop(tick)
                 times[-1] += time.thread_time_ns() - begin

@@ -18,8 +18,6 @@ from wam_description.interface import declared
 from wam_description.rigid_body import RigidBody
 from wam_sim.simulation import Simulation
 
-# parts of a direct run
-
 NODES = ("contact_estimator", "force_loop", "velocity_loop", "transform", "gravity", "scenario")
 WITHIN = {  # methods of an object of the simulation, by part
     "driver: substeps": ("driver.plant", "step"),
@@ -93,8 +91,6 @@ def parts(quick: bool) -> Values:
 PARTS = Benchmark(
     parts, "us of a period", [Ratio(name) for name in (WHOLE, "driver", *NODES, TRUTH, REST, *WITHIN)], rounds=15
 )
-
-# the contact estimator, of a moving arm that is pushed
 
 POSE = (0.1, -1.05, 0.3, 0.5)  # rad
 FIXED, UPDATE = "fixed workload", "contact_estimator"

@@ -56,8 +56,6 @@ def scenario_steps(seconds: float, shared: Shared) -> list[ScenarioStep]:
         return load(script, shared)
 
 
-# the plant
-
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 FREE = (0.0, -0.6, 0.0, 0.5)  # rad
 IN_CONTACT = (0.0, -1.974, 0.0, 1.45)  # rad, the outer link just touches the box
@@ -141,8 +139,6 @@ CASES = {
     "testbed, moving": lambda: Case((0.1,), extra=0.2, name="testbed"),
 }
 
-
-# the inner loop as C
 
 DIRECT, OVER, AS_PYTHON = "run without ROS, times real time", "substep over mj_step, ", ", plain Python"
 GAIN = "gain"

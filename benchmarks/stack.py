@@ -66,8 +66,6 @@ def watched_clock() -> Iterator[tuple[Executor, Readings]]:
         connection.close()
 
 
-# speed
-
 BARE = 94.0  # times real time of the bare plant on the computer of the requirements
 FASTER = "this computer over that of the requirements"
 
@@ -174,8 +172,6 @@ SPEED = Benchmark(
     rounds=5,
 )
 
-
-# round trip
 
 PERIOD = 0.001  # s
 PROCESSORS = os.sched_getaffinity(0)
@@ -329,8 +325,6 @@ ROUND_TRIP = Benchmark(
     rounds=11,
 )
 
-
-# real time
 
 LONGEST = 1200.0  # s, for one demonstration
 SHORT = 3.0  # s, of another one
