@@ -216,8 +216,10 @@ class RunningArm:
             raise ArmFault(f"{' and '.join(self.interface.publishers(topic))} published {topic}: {reason}") from None
 
     def status(self, node: str) -> NodeStatus | None:
-        """The newest status of a node, None before the first."""
+        """The newest status of a node, None before the first; raises ValueError where there is no such node."""
         self._require_start()
+        if node not in self.nodes:
+            raise ValueError(f"no node '{node}' in this test; it has {', '.join(self.nodes)}")
         return self._client.statuses.get(node)
 
     # what the test does
@@ -327,7 +329,7 @@ class RunningArm:
         Parameters
         ----------
         topic : name in the table of topics.
-        value : State, Wrench, Point, Table or PosturePath.
+        value : State, Wrench, Point or Table; messages of other types are for a node of your own, see `add`.
         seconds : arm's time in which it is sent again with each joint state; 0 sends it once, and the force loop
             ignores a single command.
         fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.

@@ -99,6 +99,8 @@ def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningAr
     ):
         with pytest.raises(ValueError, match=reason):  # which no node takes here
             arm.send(name, position=[0.0, 0.0])
+    with pytest.raises(ValueError, match="no node 'forceloop' in this test; it has driver, "):
+        arm.status("forceloop")
     with pytest.raises(ValueError, match="no field 'positions'; it has position, velocity, effort"):
         arm.send("joint_posture_command", positions=[0.0])
 
