@@ -26,7 +26,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
     sentences, findings, brief, alone = [], [], [], []
     doubts, wrong = list[str](), list[str]()
     moving = [one for one in states if one.is_joint and not rests(one)]
-    driven = {one.name for one in moving if len(np.unique(np.nan_to_num(one.values.get("effort", 0.0)))) > 1}
+    driven = {one.name for one in moving if _acts(one)}
     for one in moving:
         if unlike := contradiction(one) or limited(one):
             wrong.append(f"{one.label}: {unlike}, so friction and inertia are not computed.")
@@ -39,8 +39,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            acting = np.unique(np.nan_to_num(one.values.get("effort", [0.0, one.name not in driven])))
-            if driven and len(acting) > 1 and one.values.keys() != {"effort"}:
+            acts = _acts(one) if "effort" in one.values else one.name not in driven
+            if driven and acts and one.values.keys() != {"effort"}:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue
@@ -72,6 +72,12 @@ def effort_section(recording: AnalysedRecording) -> Section:
             "friction from a delay of the effort."
         )
     return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, brief, wrong)
+
+
+def _acts(source: Source) -> bool:
+    """Whether an effort was recorded that changes."""
+    effort = np.nan_to_num(source.values.get("effort", np.zeros(0)))
+    return bool(np.any(effort != effort[:1]))
 
 
 def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:

@@ -102,14 +102,15 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
 def step_section(recording: AnalysedRecording) -> Section:
     """Steps of a commanded force or torque, and how the measured one followed."""
     forces, commands = [one for one in recording.states if not one.is_joint], recording.commands
-    followed = [(one, command) for one in forces if (command := recording.command_of(one)) is not None]
+    pairs = [(one, recording.command_of(one)) for one in forces]
+    followed = [(one, command) for one, command in pairs if command is not None]
     sentences, findings, shows = [], [], []
     doubts = [
         f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
         f"{other.frame}."
-        for one in forces
+        for one, command in pairs
         for other in commands
-        if recording.command_of(one) is None and not other.is_joint and not one.shares_frame(other)
+        if command is None and not other.is_joint and not one.shares_frame(other)
     ]
     topics = [command.topic for _, command in followed]
     doubts += [text for one in commands if one.topic in topics and (text := _arrival(one))]
@@ -144,7 +145,7 @@ def step_section(recording: AnalysedRecording) -> Section:
     if not shows and not doubts:
         hint = "; name the topic of its command with --command" * bool(forces and not followed)
         sentences.append(f"No step of a commanded force was recorded{hint}.")
-    doubts += [text for one in forces if (text := _tared(one, recording.command_of(one)))]
+    doubts += [text for pair in pairs if (text := _tared(*pair))]
     doubts += [
         f"{one.label}: {text}."
         for one in forces

@@ -120,9 +120,9 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
 def rising(stamps: Times, received: Times) -> Times:
     """The stamps, or times by reception where the stamps are of a clock that was set, reset or never set.
 
-    A few stamps that are years away from their reception, such as 0, or far from those before and after, as that of a
-    first message that waited for the recorder, are replaced by it, less the usual delay.  Of a clock that was set the
-    parts are placed by the usual delay, too.
+    A few stamps are replaced by their reception, less the usual delay: those that are years away from it, such as 0,
+    and those far from the stamps before and after, as of a first message that waited for the recorder.  The parts of
+    a clock that was set are placed by the usual delay, too.
     """
     if len(stamps) < 2:
         return stamps

@@ -11,7 +11,7 @@ class ContactThresholds:
     # of the threshold, that of the faster estimate, whose covariance is rather too large: in 13 min of motion without
     # contact, of arms with errors, its statistic was at most 16, that of the slower one 28
     sudden: float = 0.75
-    shaking_time: float = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
+    shaking_time: float = 0.3  # s after a contact, in which the cables vibrate: the faster estimate is not used
     shaken: float = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
     # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
     alone: float = 2.0
