@@ -133,8 +133,8 @@ def test_the_guard_counts_a_payload() -> None:
 def test_a_hand_leads_the_arm_from_its_motors_with_the_dither(newtons: float, least: float, most: float) -> None:
     """Down to what friction allows: without the dither 3 N move it by 0.8 mm."""
     task = TaskCommand("base", joint_axes(AxisKind.IMPEDANCE, [None] * 4, 5.0))
-    push = Push(OUTER, 0.35, (0.0, newtons, 0.0), 0.5, 1.5)
-    run = free_arm(POSE, ScenarioStep("lead", 1.6, task=task, push=push), **MOTORS)
+    push, soft = Push(OUTER, 0.35, (0.0, newtons, 0.0), 0.5, 1.5), {"force_loop:guard.contact_stiffness": 100.0}
+    run = free_arm(POSE, ScenarioStep("lead", 1.6, task=task, push=push), **MOTORS, **soft)
     places = []
     while not run.step():
         places.append(BODY.point(run.driver.plant.q, OUTER, (0.35, 0.0, 0.0)))

@@ -144,7 +144,6 @@ def test_the_posture_never_moves_along_an_axis() -> None:
 @pytest.mark.parametrize(("stiffness", "damping", "place"), [(400.0, 100.0, PLACE), (0.0, 200.0, None)])
 def test_an_impedance_yields_as_its_spring_and_its_damper_do(stiffness: float, damping: float, place: Any) -> None:
     world = Springs()
-    lever = world.lever(Y)
     task = base(TaskAxis(AxisKind.IMPEDANCE, -1, COVER, place, Y, None, 0.0, stiffness, damping))
     world.step(task, 10)
     start = float(np.array(Y) @ BODY.point(world.q, COVER, (PLACE, 0.0, 0.0)))
@@ -155,18 +154,21 @@ def test_an_impedance_yields_as_its_spring_and_its_damper_do(stiffness: float, d
     drive = 4.0 - OWN.task.deadband
     expected = drive / stiffness * (1.0 - math.exp(-stiffness / damping)) if stiffness else drive / damping
     assert moved == pytest.approx(expected, rel=0.06)
-    assert lever @ lever > 0.0
 
 
-def test_an_impedance_is_slowed_by_the_factor_of_the_guard() -> None:
-    world, own = Springs(), replace(GIVEN, task=replace(GIVEN.task, least_damping=5.0))
-    world.loop = ForceLoop(WAM, SHARED.servo, own, SHARED.timing)
+@pytest.mark.parametrize(("joint", "damping"), [(-1, 5.0), (1, 1.0)])
+def test_an_impedance_is_slowed_by_the_factor_of_the_guard(joint: int, damping: float) -> None:
+    world, own = Springs(), replace(GIVEN.task, least_damping=damping, least_joint_damping=damping)
+    world.loop = ForceLoop(WAM, SHARED.servo, replace(GIVEN, task=own), SHARED.timing)
+    axis, band = impedance(Y, stiffness=0.0), own.deadband
+    if joint >= 0:
+        axis, band = TaskAxis(AxisKind.IMPEDANCE, joint, value=None), own.joint_deadband
     for _ in range(100):
-        world.hand = 2.0 * world.lever(Y)
-        out = world.step(base(TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, damping=5.0)))
-    factor, speed = world.loop.supervision.factor, float(world.lever(Y) @ out.velocity)
-    assert factor < 0.9
-    assert speed == pytest.approx(factor * (2.0 - own.task.deadband) / 5.0, rel=0.02)
+        along = world.lever(Y) if joint < 0 else np.eye(4)[joint]
+        world.hand = 2.0 * along
+        out = world.step(base(axis._replace(damping=damping)))
+    assert (factor := world.loop.supervision.factor) < 0.9
+    assert float(along @ out.velocity) == pytest.approx(factor * (2.0 - band) / damping, rel=0.02)
 
 
 def impedance(along: Triple, value: float | None = None, stiffness: float = 400.0) -> TaskAxis:

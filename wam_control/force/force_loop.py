@@ -350,7 +350,7 @@ class ForceLoop:
         run, own = self._run, self.parameters
         speeds = [self._speed(one, dt) for one in run.axes]
         watch = self.supervision.watch
-        is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_force for one in run.axes)
+        is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_fed_back for one in run.axes)
         if is_watching or not is_assessed:
             speeds = [0.0] * len(speeds)
         run.delayed = [*run.delayed, speeds][-own.delay_samples - 1 :]
@@ -375,8 +375,7 @@ class ForceLoop:
                 one.side = -one.side  # an impedance may be pushed from either side
             drive = axis.of.stiffness * (axis.side * goal - axis.at) - known.force
             yielding = math.copysign(max(abs(drive) - band, 0.0), drive)
-            factor = 1.0 if axis.is_joint else self.supervision.factor  # of joints alone nothing is assessed
-            speed = axis.side * axis.of.rate + factor * yielding / own.task.damping(axis.of)
+            speed = axis.side * axis.of.rate + self.supervision.factor * yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
     def _force_speed(self, one: AxisRun, dt: float) -> float:

@@ -167,12 +167,12 @@ class Supervision:
         """
         own, contacts = self.parameters, []
         for axis in axes:
-            if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < np.inf:
+            if axis.place is not None and axis.is_fed_back:
                 direction = triple(axis.direction)
                 contacts.append(GuardedContact(tuple(q), *axis.place[:3], direction, axis.desired or FORCE.hand))
         if contacts:
             together = [tuple(contacts)]
-        elif any(axis.is_joint and axis.is_force for axis in axes):
+        elif any(axis.is_joint and axis.is_fed_back for axis in axes):
             anywhere = TaskAxis(AxisKind.FORCE, position=None)
             places = ContactPlace(self.guard.arm.covers).step(anywhere, contact, 0.0, own)
             alone = (self.guard.contacts(q, *place[:3], [FORCE.sized_force]) for place in places)
