@@ -50,7 +50,7 @@ def _value(text: str) -> Value:
     """A value of an event; what is neither a number nor a name in JSON stays as it is written."""
     try:
         value = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return text
     return value if isinstance(value, str | float | int) else text
 

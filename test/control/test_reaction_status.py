@@ -81,6 +81,13 @@ def test_an_event_that_is_not_understood_is_left_out(given: dict[str, str]) -> N
     assert parse("driver", 1, "", given.items()).events == ()
 
 
+@pytest.mark.parametrize("text", ["{", "[" * 9999], ids=["no JSON", "too deep"])
+def test_a_value_of_an_event_that_is_not_understood_stays_as_it_is_written(text: str) -> None:
+    given = {"event.1": "fault", "event.1.severity": "WARN", "event.1.force": text}
+    (event,) = parse("driver", 1, "", given.items()).events
+    assert event.values == {"force": text}
+
+
 def test_a_message_that_is_refused_before_the_node_has_it_is_an_event_of_its_status() -> None:
     late = warning(Code.NOT_REACHED, "joint_end", joint="joint1")
     status = with_refused(NodeStatus(Level.WARN, "late", events=(late,)), {"task_command": "no table"})
