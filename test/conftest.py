@@ -5,9 +5,9 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -87,3 +87,11 @@ def soon() -> float:
     begin = time.monotonic()
     subprocess.run([sys.executable, "-c", "import numpy"], check=True)
     return max(2.0, 20.0 * (time.monotonic() - begin))
+
+
+def wait(until: Callable[[], Any], what: str, timeout: float = LONG) -> None:
+    """Wait until something is true; the test fails where it takes too long."""
+    end = time.monotonic() + timeout
+    while not until():
+        assert time.monotonic() < end, f"not within {timeout} s: {what}"
+        time.sleep(0.02)

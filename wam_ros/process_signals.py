@@ -16,14 +16,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# SIGHUP comes where the terminal is closed; nohup has it ignored
+SIGNALS = [signal.SIGINT, signal.SIGTERM] + [signal.SIGHUP] * (signal.getsignal(signal.SIGHUP) != signal.SIG_IGN)
 LISTENER_GONE = signal.SIGUSR1  # from bring-up, before SIGTERM: a node was killed, which takes no message any more
 HELD_UP: Final = signal.SIGVTALRM  # by which the system ends a process that does not leave the network
 LONGEST: Final = 1.0  # s of computing to leave the network, a hundred times what it takes
 
 
 def end_at_once_on_signals(last_words: str = "") -> None:
-    """Until the program handles SIGINT and SIGTERM itself, they end it with code 128 + number.
+    """Until the program handles `SIGNALS` itself, they end it with code 128 + number.
 
     Parameters
     ----------
@@ -42,13 +43,13 @@ def end_at_once_on_signals(last_words: str = "") -> None:
 
 
 def ignore_signals() -> None:
-    """Ignore SIGINT and SIGTERM: the program has done its work and ends."""
+    """Ignore `SIGNALS`: the program has done its work and ends."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 class Stop:
-    """Set by SIGINT and SIGTERM; the context stays alive, so that nodes can report that they end."""
+    """Set by `SIGNALS`; the context stays alive, so that nodes can report that they end."""
 
     def __init__(self) -> None:
         self.is_set = False

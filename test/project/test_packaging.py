@@ -19,7 +19,7 @@ import pytest
 import yaml
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 from catkin_pkg.package import parse_package
-from conftest import LONG
+from conftest import LONG, wait
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -424,15 +424,10 @@ def test_nodes_end_with_the_launch_even_where_it_ends_at_once(launch_file, tmp_p
         [sys.executable, "-c", code, name, *command, *node.parameters], stdout=subprocess.PIPE, text=True
     )
     pid = int(launch.stdout.readline())
-    deadline = time.monotonic() + LONG
-    while occupant(domain_id, "/wam", "gravity") != pid:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait(lambda: occupant(domain_id, "/wam", "gravity") == pid, "the node")
     launch.terminate()
     launch.communicate()
-    while occupant(domain_id, "/wam", "gravity"):
-        assert time.monotonic() < deadline, "an orphan"
-        time.sleep(0.05)
+    wait(lambda: not occupant(domain_id, "/wam", "gravity"), "an orphan")
 
 
 def test_package_xml_is_valid_for_ros():

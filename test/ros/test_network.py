@@ -14,7 +14,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from conftest import LONG, ROOT
+from conftest import LONG, ROOT, wait
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -186,10 +186,8 @@ def hosts() -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
                 ip("-n", name, "addr", "add", f"10.99.0.{number}/24", "dev", "there")
                 for device in ("lo", "there"):
                     ip("-n", name, "link", "set", device, "up")
-            end = time.monotonic() + LONG
-            while not all("state UP" in ip("-n", name, "-o", "link", "show", "there") for name in names):
-                assert time.monotonic() < end  # the middleware looks for its interfaces once, when it starts
-                time.sleep(0.05)
+            # the middleware looks for its interfaces once, when it starts
+            wait(lambda: all("state UP" in ip("-n", name, "-o", "link", "show", "there") for name in names), "both up")
         except subprocess.CalledProcessError as error:
             pytest.skip(f"no two network namespaces here: {error.stderr.strip()}")
         # a host has a shared memory of its own

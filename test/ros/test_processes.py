@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import LONG, soon
+from conftest import LONG, soon, wait
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool
 
@@ -33,15 +33,8 @@ from wam_ros.run import prepare_logging_directory, run
 
 ROOT = Path(__file__).parents[2]
 NODES = 7  # six and the recorder
+PYTHON = ("env", "--default-signal=HUP", sys.executable)  # nohup would have it ignored
 BOLD = ("--set", "driver:late_periods=1.0")  # a busy machine is no obstacle
-
-
-def wait(until: Callable[[], Any], what: str, timeout: float = LONG) -> None:
-    """Wait until something is true; the test fails where it takes too long."""
-    end = time.monotonic() + timeout
-    while not until():
-        assert time.monotonic() < end, f"not within {timeout} s: {what}"
-        time.sleep(0.02)
 
 
 class Stack:
@@ -53,7 +46,7 @@ class Stack:
         everything = {**os.environ, "PYTHONPATH": str(ROOT), "WAM_STACK_TEST": str(folder), **environment}
         with self.output.open("w") as output:
             self.process = subprocess.Popen(
-                [sys.executable, *command], stdout=output, stderr=output, cwd=folder, env=everything
+                [*PYTHON, *command], stdout=output, stderr=output, cwd=folder, env=everything
             )
 
     def alive(self) -> list[int]:
@@ -138,13 +131,13 @@ def enable(ros: Any, stack: Stack) -> None:
     ros.wait(lambda: "enabled" in seen, what=f"the status 'enabled'; {stack.said()}")
 
 
-@pytest.mark.parametrize(("number", "options"), [(signal.SIGINT, ()), (signal.SIGTERM, ("--processes", GROUPED))])
+@pytest.mark.parametrize(("name", "options"), [("INT", ()), ("TERM", ("--processes", GROUPED)), ("HUP", ())])
 def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
-    number: signal.Signals, options: tuple[str, ...], started: Any, tmp_path: Path, ros: Any
+    name: str, options: tuple[str, ...], started: Any, tmp_path: Path, ros: Any
 ) -> None:
     stack = up(started, *options)
     enable(ros, stack)
-    stack.process.send_signal(number)
+    stack.process.send_signal(signal.Signals[f"SIG{name}"])
     wait(lambda: stack.process.poll() is not None, f"the end of wam up; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     assert stack.process.returncode == 0
@@ -157,8 +150,7 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
 def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Processes:
     """A recorder as a process, with a bag that is open."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end=0.2))
-    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end_reports=0.2))
+    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end=0.2, end_reports=0.2))
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
     wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
     return processes
@@ -302,6 +294,7 @@ PROGRAMS = {
     "node": ("wam_cli.main", "node", "driver"),
     "demo": ("wam_cli.main", "demo", "--no-live"),
     "scorecard": ("wam_cli.main", "model", "scorecard"),
+    "live": ("wam_cli.main", "live", str(ROOT / "bags" / "sample" / "wam-touch")),
     "program": ("wam_cli.program", "node", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
 }
 
@@ -312,6 +305,7 @@ PROGRAMS = {
         ("node", "mujoco", signal.SIGINT),
         ("demo", "mujoco", signal.SIGINT),
         ("scorecard", "numpy", signal.SIGTERM),
+        ("live", "PIL", signal.SIGINT),
         ("program", "pinocchio", signal.SIGINT),
     ],
 )

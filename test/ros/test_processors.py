@@ -3,11 +3,10 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from conftest import LONG
+from conftest import wait
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import EACH, GROUPED
@@ -54,10 +53,8 @@ def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> Non
     permitted = os.sched_getaffinity(0)
     configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": ENTRIES})
     with Processes(configuration) as processes:
-        end = time.monotonic() + LONG
-        while {policy for threads in placed(processes).values() for policy, _ in threads} != {os.SCHED_BATCH}:
-            assert time.monotonic() < end, "threads keep another policy"
-            time.sleep(0.02)
+        policies = lambda: {policy for threads in placed(processes).values() for policy, _ in threads}  # noqa: E731
+        wait(lambda: policies() == {os.SCHED_BATCH}, "threads keep another policy")
         found = placed(processes)
     driver, velocity_loop, contact_estimator = ({where for _, where in found[name]} for name in ENTRIES)
     assert driver == velocity_loop
@@ -86,11 +83,8 @@ def test_in_lockstep_the_inner_loop_has_a_processor_and_all_others_the_rest(
 def test_processes_in_realtime_may_be_anywhere_with_their_priority(domain_id: int) -> None:
     permitted = frozenset(os.sched_getaffinity(0))
     with Processes(REALTIME) as processes:
-        end = time.monotonic() + LONG
-        expected = expected_priorities()
-        while expected != {name: priority(processes.processes[name].pid) for name in ENTRIES}:
-            assert time.monotonic() < end, "some have another priority"
-            time.sleep(0.02)
+        present = lambda: {name: priority(processes.processes[name].pid) for name in ENTRIES}  # noqa: E731
+        wait(lambda: present() == expected_priorities(), "some have another priority")
         found = {one for threads in placed(processes).values() for one in threads}
     assert {where for _, where in found} == {permitted}
     assert os.SCHED_BATCH not in {policy for policy, _ in found}

@@ -45,12 +45,12 @@ def run(given: argparse.Namespace) -> int:
     require_option(given, "--tf", "--frame-prefix")
     if given.bag is not None and (given.tf or given.trajectories):
         raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")
+    end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
     if given.bag is not None:
         return _recording(given)
     from wam_ros.run import die_with_parent  # a recording is shown without ROS
 
     given.namespace = given.namespace or ARM
-    end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
     die_with_parent()
     if given.tf:
         _frames(given)
@@ -97,7 +97,6 @@ def _recording(given: argparse.Namespace) -> int:
     """Play a recording in the browser."""
     with needing_viser():
         from wam_live.playback import play
-    stop = Stop()
     port = free_port(given.port, _print)
     from wam_analysis.recording import AnalysedRecording
     from wam_bag.bag import read
@@ -105,6 +104,7 @@ def _recording(given: argparse.Namespace) -> int:
     found = AnalysedRecording(read(given.bag), given.namespace or "")
     if found.run.others:  # of several arms in a bag, this one is named
         _print(found.run.others)
+    stop = Stop()
     play(found, port, lambda: stop.is_set, _print)
     return 0
 
