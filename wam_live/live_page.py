@@ -19,6 +19,7 @@ from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Pres
 from wam_live.push import release
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import Scene
+from wam_live.services import SERVICES
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
 from wam_live.thresholds import LIVE
@@ -31,7 +32,7 @@ from wam_ros.wire import stamp_in
 
 
 class LivePage:
-    """The page of a running stack.
+    """The page of a running stack, served at once; it waits for the stack.
 
     Parameters
     ----------
@@ -46,21 +47,16 @@ class LivePage:
     """
 
     def __init__(self, namespace: str, port: int, notify: Callable[[str], None], domain_id: int | None = None) -> None:
-        self._namespace, self._port, self._notify = namespace, port, notify
         self._connection = Connection(domain_id=domain_id)
         self._client = StackClient(namespace, "live", self._connection)
         self._client.follow_statuses()
-        self._server: Any = None
+        self._server = serve(port)
+        self._waiting = self._server.gui.add_html(paragraph("waiting for the arm; <code>wam up</code> starts one"))
+        notify(f"live page: {url(port)}")
         self.shown: ShownStack | None = None
 
-    def open(self) -> None:
-        """Serve a page that waits for the stack."""
-        self._server = serve(self._port)
-        self._waiting = self._server.gui.add_html(paragraph("waiting for the arm; <code>wam up</code> starts one"))
-        self._notify(f"live page: {url(self._port)}")
-
     def run(self, until: Callable[[], bool]) -> None:
-        """Show the stack until a condition holds; it may start later."""
+        """Show the stack until a condition holds, then leave; it may start later."""
         try:
             flat = self._client.await_driver(until, dict.fromkeys(node for node, _ in SLIDERS))
             if not flat:
@@ -75,17 +71,9 @@ class LivePage:
                 shown.draw()
             shown.release()
         finally:
-            self.close()
-
-    def close(self) -> None:
-        """End the server and leave ROS; a scenario that was begun here ends."""
-        if self.shown is not None:
-            self.shown.player.close()
-        if self._server is not None:
             with quiet():
                 self._server.stop()
-            self._server = None
-        self._connection.close()
+            self._connection.close()
 
 
 class ShownStack:
@@ -121,6 +109,10 @@ class ShownStack:
         self.panel = Controls(server, shared.arm, self._live, dither_text(shared.timing))
         self.player = ScenarioPlayer(shared, namespace.strip("/"))
         self._pictures = 0
+        for request in (call for _, calls in SERVICES.values() for call in calls):
+            client.service(request)  # so that each is found before it is needed
+        for node, _ in sliders:
+            client.service(SetParameters(node, {}))
         server.on_client_disconnect(lambda _: self.panel.requests.put(NO_PRESS))  # nobody sees the force
 
     def draw(self) -> None:
@@ -145,6 +137,7 @@ class ShownStack:
         """End what the page commands."""
         self._end_press()
         self._send(None)
+        self.player.close()
 
     @property
     def _is_enabled(self) -> bool:
@@ -162,14 +155,10 @@ class ShownStack:
 
     def _start_press(self, press: Press) -> None:
         """Answer each state with the force from now on."""
-        if not self._is_enabled:
-            self.panel.notify("not pressed: enable the arm first", refused=True)
-            return
         self._press = press
         if self._states is None:
             row = BY_NAME["joint_states"]
             self._states = self._node.create_subscription(message_type(row), row.name, self._answer, qos(row), raw=True)
-        self.panel.notify("")  # the status has what becomes of it
 
     def _answer(self, state: bytes) -> None:
         if self._press is None:
@@ -188,33 +177,36 @@ class ShownStack:
     def _bend(self) -> str:
         """Move to the posture for a press; returns why that is not possible, '' where it is."""
         present = self._source.snapshot().q
-        if not self._is_enabled:
-            return "enable the arm first"
         return self.player.move(present, self._bent) if len(self._bent) == len(present) else "no force loop runs"
 
     def _ask(self, request: Request, text: str = "") -> None:
         """Make a request, and show its answer, or a text in place of it."""
+        refusal = ""
         match request:
+            case Call() | SetParameters():
+                self._call(request, text)
+                return
+            case Press(_, force) if not any(force):
+                if self._press is None:
+                    return
+                self._end_press()
+                text = "letting go"
             case Play(""):
                 self.player.stop()
+                text = "the scenario ends"
             case Play(script):
-                refusal = self.player.play(script)
-                self.panel.notify(refusal or f"playing {script}", refused=bool(refusal))
-            case Bend():
-                refusal = self._bend()
-                self.panel.notify(f"not moved: {refusal}" if refusal else "bending the arm", refused=bool(refusal))
-            case Press(_, force) if any(force):
-                self._start_press(request)
+                refusal, text = self.player.play(script), f"playing {script}"
+            case _ if not self._is_enabled:
+                refusal = "enable the arm first"
             case Press():
-                if self._press is not None:
-                    self._end_press()
-                    self.panel.notify("letting go")
-            case _:
-                self._call(request, text)
+                self._start_press(request)  # the status has what becomes of it
+            case Bend():
+                refusal, text = self._bend(), "bending the arm"
+        self.panel.notify(refusal or text, refused=bool(refusal))
 
     def _call(self, request: Call | SetParameters, text: str) -> None:
         client, message = self._client.service(request)
-        if not client.wait_for_service(0.5):
+        if not client.service_is_ready():  # the page waits for no node: the next request may be an emergency stop
             self.panel.notify(f"{request.node} does not answer", refused=True)
             return
         client.call_async(message).add_done_callback(

@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Thread
 
 import yaml
 
@@ -11,7 +12,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, listed, values
 from wam_live.thresholds import LIVE
-from wam_ros.bring_up import NodeProcess
+from wam_ros.bring_up import NO_FAILURE, NodeProcess
 
 NODE = "scenario"
 
@@ -62,16 +63,14 @@ class ScenarioPlayer:
         """How the scenario ended, once; '' before and after."""
         if self._node is None or (code := self._node.poll()) is None:
             return ""
-        self.stop()
-        return (
-            "the scenario has ended" if code == 0 else "the scenario failed; its status and the console have the reason"
-        )
+        self._node = None
+        failed = "the scenario failed; its status and the console have the reason"
+        return "the scenario has ended" if code in NO_FAILURE else failed
 
     def stop(self) -> None:
-        """End the scenario; the arm holds its posture."""
+        """Let the scenario end, while the page goes on; the arm holds its posture."""
         if self._node is not None:
-            self._node.close()
-            self._node = None
+            Thread(target=self._node.close).start()
 
     def close(self) -> None:
         """End the scenario and leave no file."""

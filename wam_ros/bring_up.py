@@ -23,7 +23,7 @@ from wam_ros.ros_topics import NAMESPACE
 from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, run
 
 LOGGER: Final = get_logger("wam")
-# codes of a recorder whose bag is whole, or that SIGTERM ended before it had one
+# codes of a node that has done its work, or that SIGTERM ended before it began, as a recorder without a bag
 NO_FAILURE: Final = (0, -signal.SIGTERM, 128 + signal.SIGTERM)
 
 

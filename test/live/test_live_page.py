@@ -6,6 +6,7 @@ import json
 import math
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import threading
@@ -16,6 +17,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,7 +27,7 @@ import numpy as np
 import pytest
 from bag_comparison import compare
 from browser import browser
-from conftest import LONG
+from conftest import LONG, wait
 from ros_network import Network
 
 from wam_analysis.recording import AnalysedRecording
@@ -306,7 +308,6 @@ class Shown:
         self.port = free_port()
         self._end = threading.Event()
         self.page = LivePage("wam", self.port, lambda line: None, domain_id)
-        self.page.open()
         self._thread = threading.Thread(target=self.page.run, args=(self._end.is_set,))
         self._thread.start()
 
@@ -409,6 +410,16 @@ def test_a_scenario_is_played_into_a_running_stack_and_a_wrong_one_is_refused(
         assert abs(panel.snapshot.q[0] - start[0]) > 0.02, panel.snapshot
         ended = panel.snapshot.stamp
         shown.wait(lambda: panel.snapshot.stamp > ended + 10**8, spin)  # time goes on
+        panel.requests.put(Play(str(script)))
+        player = shown.page.shown.player
+        shown.wait(lambda: player._node, spin)
+        (node := player._node).send_signal(signal.SIGSTOP)
+        panel.requests.put(Play(""))
+        panel.requests.put(Call("driver", "estop"))
+        shown.wait(lambda: mode_of(shown) == "fault", spin)
+        assert node.poll() is None, "a scenario that does not end holds up no emergency stop"
+        node.send_signal(signal.SIGCONT)
+        shown.wait(lambda: "the scenario has ended" in panel._shown.content, spin)
 
 
 @pytest.fixture(scope="module")
@@ -583,7 +594,7 @@ FLAGS = (
     "--disable-sync", "--disable-dev-shm-usage", "--remote-allow-origins=*", "--window-size=1280,800",
 )  # fmt: skip
 
-PATIENCE = 100.0  # s
+until = partial(wait, what="it never came", timeout=100.0)
 ANSWERED = 40.0  # s, within which the browser answers on any machine that can draw
 
 
@@ -692,14 +703,6 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
             while not user.done():
                 spin()
         user.result()
-
-
-def until(holds: Callable[[], Any]) -> None:
-    """Wait until something holds in the browser."""
-    end = time.monotonic() + PATIENCE
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.05)
 
 
 def test_objects_of_the_world_are_drawn_where_the_simulator_has_them(server: Any) -> None:

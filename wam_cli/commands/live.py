@@ -68,7 +68,6 @@ def _page(given: argparse.Namespace) -> None:
         from wam_live.live_page import LivePage
     stop = Stop()
     page = LivePage(given.namespace, free_port(given.port, _print), _print)
-    page.open()
     if PARENT in os.environ:  # from now on the stack comes first
         set_priority(0, NICENESS)
     page.run(lambda: stop.is_set)
