@@ -168,8 +168,7 @@ def test_gains_of_joint_torques_are_taken_down_before_the_arm_moves(gain: float,
     loop = Loop(replace(OWN, torque_gain=(gain,), torque_error_limit=(1e3,), limits=FREE))
     while not any(velocity):
         velocity = loop.step(ForceInput(state, 0.005, free, NO_CONTACT, torque=[0.0, 1.0, 0.0, 0.0])).velocity
-    assert loop.supervision.watch is not None
-    assert loop.supervision.watch.assessed
+    assert loop.supervision.watch and loop.supervision.watch.assessed
     assert (loop.supervision.watch.factor < 0.3) is is_lowered
     assert max(velocity) == pytest.approx(loop.supervision.watch.factor * gain, rel=1e-3)
 
@@ -323,9 +322,8 @@ def test_the_velocity_obeys_the_factor() -> None:
     for _ in range(300):
         out = loop.step(ForceInput(state, 0.005, state, NO_CONTACT, command=command, posture=list(STIFF_POSE)))
         speeds.append(float(np.linalg.norm(out.velocity)) / abs(out.error[2]))
-    assert loop.supervision.watch is not None
-    assert loop.supervision.watch.factor < 0.75
-    assert speeds[-1] == pytest.approx(loop.supervision.watch.factor * speeds[0], rel=1e-6)
+    assert loop.supervision.factor < 0.75
+    assert speeds[-1] == pytest.approx(loop.supervision.factor * speeds[0], rel=1e-6)
 
 
 ROD = changed(one_joint(), motors={"inertia": (2e-3,)}, joints={"viscous_friction": (4.0,)})

@@ -231,6 +231,8 @@ class ForceLoop:
         is_moving = is_zeroed and measurement.speed > FORCE.fast
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.go_on(before)
+        if self.supervision.watch is not None:
+            self.supervision.watch.restart()
 
     def _find_axes(self, task: TaskCommand | None, contact: Contact) -> None:
         """The axes of what is commanded, each at its place, in this period."""
@@ -350,8 +352,7 @@ class ForceLoop:
         run, own = self._run, self.parameters
         speeds = [self._speed(one, dt) for one in run.axes]
         watch = self.supervision.watch
-        is_assessed = watch is None or bool(watch.assessed) or not any(one.now.is_fed_back for one in run.axes)
-        if is_watching or not is_assessed:
+        if is_watching or not (watch is None or watch.is_assessed):
             speeds = [0.0] * len(speeds)
         run.delayed = [*run.delayed, speeds][-own.delay_samples - 1 :]
         late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)

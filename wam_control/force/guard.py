@@ -18,7 +18,6 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters, force_l
 from wam_control.force.problem import linear
 from wam_control.force.stability_guard import (
     GuardAssessment,
-    Guarded,
     GuardedContact,
     GuardedForces,
     GuardedTask,
@@ -159,7 +158,7 @@ class Supervision:
         if self.watch is not None and self.watch.step(lambda: self._guarded(q, axes, contact), dt):
             self.report = self._report()
 
-    def _guarded(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
+    def _guarded(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> list[GuardedForces]:
         """Where the axes press: at all contacts at once; nothing where nothing presses.
 
         What is controlled there is the linear part of the problem of a period.  Torques of joints press wherever
@@ -220,18 +219,23 @@ class Watch:
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
     needed : demanded `scale`, and the largest one that is tried: the true limit may be above it.
-    assessed : contacts of the last assessment, none before the first; another list after each.
+    assessed : contacts of the last assessment, none before the first.
+    is_assessed : whether what is commanded has been assessed, or presses nowhere.
     """
 
     def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment) -> None:
         self._guard, self._task = guard, task
         self.needed = 1.0 / guard.parameters.stability_fraction
-        self.assessed: list[GuardedContact] = []
-        self._work: Iterator[bool] | None = None
-        self._since = math.inf
+        self.assessed, self._gains = list[GuardedContact](), list[float]()
         self.factor, self.scale = 1.0, found.scale
+        self.restart()
 
-    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
+    def restart(self) -> None:
+        """Something else is commanded: it waits until it is assessed."""
+        self._work: Iterator[bool] | None = None
+        self._since, self.is_assessed = math.inf, False
+
+    def step(self, where: Callable[[], Sequence[GuardedForces]], dt: float) -> bool:
         """Continue the present assessment, or begin one if it is due; True if it has ended.
 
         Parameters
@@ -244,22 +248,28 @@ class Watch:
             self._since = 0.0
             guarded = where()
             contacts = [contact for each in guarded for contact in each.contacts]
-            if contacts and self._is_new(contacts):
-                self._work = self._assess(guarded, contacts)
+            gains = [*guarded[0].gain.tolist(), *guarded[0].proportional_gain.tolist()] if guarded else self._gains
+            if contacts and (gains != self._gains or self._is_elsewhere(contacts)):
+                self._work = self._assess(guarded, contacts, gains)
+            else:
+                self.is_assessed = True
         has_ended = self._work is not None and next(self._work, True)
         if has_ended:
-            self._work = None
+            self._work, self.is_assessed = None, True
         return has_ended
 
-    def _assess(self, guarded: Sequence[Guarded], contacts: list[GuardedContact]) -> Iterator[bool]:
+    def _assess(
+        self, guarded: Sequence[GuardedForces], contacts: list[GuardedContact], gains: list[float]
+    ) -> Iterator[bool]:
         """One scale in each period; never true."""
         least = math.inf
         for scale in self._guard.scales(self._task, guarded, [part * self.needed for part in GUARD.scales]):
             least = min(least, scale)
             yield False
-        self.assessed, self.scale, self.factor = contacts, least, min(least / self.needed, 1.0)
+        self.assessed, self._gains = contacts, gains
+        self.scale, self.factor = least, min(least / self.needed, 1.0)
 
-    def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
+    def _is_elsewhere(self, contacts: Sequence[GuardedContact]) -> bool:
         return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
 
 
