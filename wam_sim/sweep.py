@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.task.scenario import FORCE_LOOP, NO_FORCE, ScenarioStep, require_playable
+from wam_control.task.scenario import FORCE_LOOP, ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -24,7 +24,6 @@ from wam_sim.reactions import (
     doubts,
     too_short,
     unassessed,
-    unmet_in_words,
     watched_times,
 )
 from wam_sim.simulation import Simulation
@@ -52,15 +51,14 @@ class SweepResult(NamedTuple):
 
     Attributes
     ----------
-    failure : why the scenario failed, the parameters, a force, a posture or a task were refused, or a task (a joint
-        torque is one) did not reach in the end what it commands, or a posture moved too fast for the arm; '' where
-        nothing was.
+    failure : why the scenario failed, the parameters were refused, or what a step commands was not carried out; ''
+        where nothing was.
     duration : of the arm's time, s.
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
     force_peak : largest true force, N.
-    unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; and those
-        whose force another link hides, which bears more; '' for none.
+    unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; and forces
+        that were refused, or that another link hides, which bears more; '' for none.
     reported : parameters that the guard lowered; steps that count as carried out, and what the force loop reported at
         the end of each: the measured force may not be the true one; '' for nothing.
     """
@@ -152,8 +150,7 @@ def outcome(point: SweepPoint) -> SweepResult:
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}")
     reactions, played = run.reactions, run.played
-    others = [one for one in played if one.step.force == NO_FORCE]  # a force is measured, and named there if refused
-    measured = _measured(run, [failure, *unmet_in_words(reactions, others)])
+    measured = _measured(run, [failure, run.unmet])
     brief = filter(None, (measured.unassessed, _unassessed(run)))
     lowered = getattr(run.nodes.get(FORCE_LOOP), "lowered", "")
     reports = [f"the guard lowered it; used: {lowered}"] * bool(lowered)
@@ -166,7 +163,6 @@ def _measured(run: Simulation, failures: Sequence[str]) -> SweepResult:
     truth = {row.stamp: row for row in run.rows.get("sim/contact/wrench", [])}
     joints = {row.stamp: row.values[: len(body.arm.joints.names)] for row in run.rows.get("sim/joint_states", [])}
     errors: list[float] = []
-    refusals: list[str] = []
     brief: list[str] = []
     axes = run.rows.get("force_axis", [])
     commands = [row for row in run.rows.get("force_command", []) if row.stamp in truth]
@@ -177,7 +173,7 @@ def _measured(run: Simulation, failures: Sequence[str]) -> SweepResult:
             continue
         command = f"{math.hypot(*force[:3]):.3g} N in {held[0].frame}"
         if refusal := _refusal(reactions, settled[0].stamp, settled[-1].stamp):
-            refusals.append(f"{command} refused: {refusal}")
+            brief.append(f"{command} refused: {refusal}")
             continue
         if BRIEF < held[-1].stamp - held[0].stamp < 1e9 * STEADY - BRIEF:  # no sample of a chirp
             brief.append(f"{command}: commanded for less than {STEADY:g} s")
@@ -188,7 +184,7 @@ def _measured(run: Simulation, failures: Sequence[str]) -> SweepResult:
         errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in seen]
     peak = max((math.hypot(*row.values[:3]) for row in truth.values()), default=0.0)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors)) if errors else math.nan
-    failure = "; ".join(filter(None, dict.fromkeys((*failures, *refusals))))
+    failure = "; ".join(filter(None, failures))
     largest = max(map(abs, errors), default=math.nan)
     return SweepResult(failure, run.driver.stamp * 1e-9, rms, largest, peak, "; ".join(dict.fromkeys(brief)))
 

@@ -145,6 +145,7 @@ steps:
     [
         ("torque: [0, 0, 0, 50]", "press refused: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
         ("torque: [0, 0, 0, 2]", "press not reached: torque of joint 4: "),
+        ("force: {frame: outer_link, newtons: [0, -4, 0]}", "press not reached: force along (0, -1, 0): 4 N are"),
         (
             "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
             "press refused: force along (0, 0, -1) at 0.28 m along outer_link: 70 N is commanded; allowed: up to",
