@@ -30,7 +30,6 @@ from wam_ros.tolerance import LeavingNode
 from wam_ros.wire import decoder, encoder, stamp_in, status_of
 
 MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
-START: Final = "start the stack with 'wam up'"
 
 
 class NoAnswerError(OSError):
@@ -163,7 +162,7 @@ class StackClient(Closing):
         requested = RemoteParameters(self.node, NODES)
 
         def found() -> list[dict[str, Any]]:
-            requested.ask()
+            requested.complete()
             return [values for values in requested.found.values() if MODE in values]
 
         self._require(found, f"no node of a stack in {self.node.get_namespace()} answers")
@@ -185,6 +184,12 @@ class StackClient(Closing):
                 return requested.found
             self.spin_once(0.05)
         return {}
+
+    @property
+    def advice(self) -> str:
+        """Where there are arms, or how to start one."""
+        arms = {where for name, where in self.node.get_node_names_and_namespaces() if name == "driver"}
+        return f"there is an arm in {' and '.join(sorted(arms))}" if arms else "start the stack with 'wam up'"
 
     def _nodes_without(self, node: str) -> list[str]:
         """The nodes of the stack, none where this one is among them."""
@@ -210,7 +215,7 @@ class StackClient(Closing):
         client = self.client(DescribeParameters, f"{node}/describe_parameters")
         answer = self.answer(client, DescribeParameters.Request(names=list(names)), CALL_LIMITS.answer)
         if answer is None:
-            raise NoAnswerError(f"node '{node}' does not answer with its parameters; {START}")
+            raise NoAnswerError(f"node '{node}' does not answer with its parameters; {self.advice}")
         return [found.name for found in answer.descriptors if not found.read_only]
 
     # statuses and topics
@@ -345,9 +350,7 @@ class StackClient(Closing):
             if there and now - since > CALL_LIMITS.discovery:
                 raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
             if now - begin > limit:
-                nodes = self._nodes_without("")
-                advice = f"there are {', '.join(nodes)}" if nodes else START
-                raise NoAnswerError(f"{failure} within {limit:g} s; {advice}")
+                raise NoAnswerError(f"{failure} within {limit:g} s; {self.advice}")
             check()
             self.spin_once(0.05)
 

@@ -232,7 +232,7 @@ class RecordedStack:
 
     def attend(self, writers: Mapping[str, str]) -> None:
         """Ask for parameters and look at those that came; `writers` are the nodes of the statuses by identity."""
-        self.parameters.ask()
+        self.parameters.complete()
         for node in self.parameters.found.keys() - self._compared:
             self._compared.add(node)
             self._note(self._difference(node))

@@ -38,21 +38,15 @@ class RemoteParameters:
         return [name for name in self._clients if name not in self.found]
 
     def complete(self) -> bool:
-        """Ask, and return whether all have answered."""
-        self.ask()
-        return not self.missing
-
-    def ask(self) -> None:
-        """Ask the nodes that are there and have not answered; call it again until none is missing."""
+        """Ask the nodes that are there and have not answered; whether all have.  Call it until they have."""
         now = time.monotonic()
         for name in self.missing:
             lister, getter = self._clients[name]
-            if now - self._requested[name] < CALL_LIMITS.parameters:
-                continue
-            if not (lister.service_is_ready() and getter.service_is_ready()):
-                continue
-            self._requested[name] = now
-            lister.call_async(ListParameters.Request()).add_done_callback(partial(self._listed, name))
+            is_due = now - self._requested[name] >= CALL_LIMITS.parameters
+            if is_due and lister.service_is_ready() and getter.service_is_ready():
+                self._requested[name] = now
+                lister.call_async(ListParameters.Request()).add_done_callback(partial(self._listed, name))
+        return not self.missing
 
     def _listed(self, name: str, future: Any) -> None:
         names = list(future.result().result.names)

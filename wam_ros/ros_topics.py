@@ -4,7 +4,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 
 from wam_description.arm import Timing
@@ -28,13 +28,9 @@ def topic_name(node: Node, topic: Topic) -> str:
 
 
 def qos(topic: Topic) -> QoSProfile:
-    """Reliable, keep last; latched topics keep one message for late subscribers."""
-    return QoSProfile(
-        reliability=ReliabilityPolicy.RELIABLE,
-        history=HistoryPolicy.KEEP_LAST,
-        depth=topic.depth,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE,
-    )
+    """Reliable, keep last, as ROS does by default; latched topics keep one message for late subscribers."""
+    durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE
+    return QoSProfile(depth=topic.depth, durability=durability)
 
 
 def listening(topic: Topic) -> QoSProfile:

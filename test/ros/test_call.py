@@ -205,7 +205,7 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
     [
         ("pause", "force_measured", "the arm is paused, and continues after 'wam call resume'"),
         ("resume", "sim/disturbance", "no node publishes it now"),
-        ("resume", "force_measured --namespace nowhere", "no driver was found: start the stack with 'wam up'"),
+        ("resume", "force_measured --namespace nowhere", "no driver was found: there is an arm in /wam"),
     ],
 )
 def test_a_topic_on_which_nothing_comes_ends_in_time_with_the_reason(

@@ -21,7 +21,7 @@ from wam_description.topics import BY_NAME
 from wam_description.wiring import SetParameters
 from wam_live.push import push
 from wam_live.services import SERVICES
-from wam_ros.client import START, StackClient
+from wam_ros.client import StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
 
@@ -193,7 +193,7 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
 def _hint(topic: str, stack: StackClient) -> str:
     """Why no message of a topic may come, '' where that is not known."""
     if "driver" not in stack.statuses:
-        return f"; no driver was found: {START}"
+        return f"; no driver was found: {stack.advice}"
     if PAUSED in stack.statuses["driver"].facts:
         return "; the arm is paused, and continues after 'wam call resume'"
     return "" if stack.is_published(topic) else "; no node publishes it now"
