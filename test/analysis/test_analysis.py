@@ -168,6 +168,9 @@ def test_motors_show_what_their_load_swings_by_between_its_samples() -> None:
     )
     moved = signals._replace(torque=signals.rotors + swing[:, np.newaxis])
     assert _unrecorded(moved)[:, 0, 1] == pytest.approx(swing)
+    turned = np.outer(np.sin(time), [0.0333667, 0.0, 0.0, 0.0])  # joint 1 as its motor, whose friction has its own
+    apart = _unrecorded(moved._replace(load_from="", joint_velocity=turned))[:, :, 2]
+    assert np.max(np.abs(apart), axis=0) == pytest.approx([0.0, 9.1e-5, 9.1e-5, 1.147e-4], rel=1e-3, abs=1e-9)
 
 
 def test_a_push_is_in_no_friction_where_only_gravity_is_known(moving: Recorded) -> None:
@@ -201,10 +204,15 @@ def test_missed_periods_are_counted_from_the_stamps(moving: Recorded) -> None:
     assert isinstance(states, JointColumns)
     keep = np.ones(len(states.stamp_ns), dtype=bool)
     keep[[500, 501, 900]] = False
+    lost = np.outer(np.arange(len(keep)) > 1200, [0.0, 0.0, 1.5, 0.0])  # counts of an encoder
+    states = states._replace(position=states.position - lost)
     fewer = JointColumns(*(c[keep] if isinstance(c, np.ndarray) else c for c in states))
     bag = moving.bag._replace(topics={**moving.bag.topics, "/wam/motor_states": fewer})
-    (timing,) = [section for section in analyse_bag(bag, lambda doing: None).sections if section.key == "timing"]
-    found = {finding.name: finding.measured for finding in timing.findings}
+    sections = {section.key: section for section in analyse_bag(bag, lambda doing: None).sections}
+    timing, found = sections["timing"], {one.name: one.measured for one in sections["timing"].findings}
+    (jump,) = sections["stick_slip"].wrong
+    assert jump == "motor3: the zero of the position moves once, by up to 1.5 rad; this is removed."
+    assert not section_of(moving, "stick_slip").wrong
     assert found["motor_states: missed periods"] == 3.0
     assert "0.003 s" in timing.sentences[0]
     assert moving.finding("motor_states: missed periods").measured == 0.0

@@ -228,7 +228,7 @@ def of_ros2_control() -> list[Case]:
             {"interface_names": ["effort", "position"], "values": [*s.fields["effort"], *s.fields["position"]]},
         ]}) for s in states
     ]  # fmt: skip
-    expected, followed = sine(0.7, 0.5) | FRICTION, ("as it was commanded.", "'messages': '3000'")
+    expected, followed = sine(0.7, 0.5) | FRICTION, ("as it was commanded.", "'messages': '3000 of 3000 ")
     beside = interfaces + one("/joint_states", 50.0, 0.7, 0.5)
     return [
         Case("new controller", by_rosbags, controller("reference", "feedback"), expected, "", NOTHING, followed),
@@ -459,7 +459,10 @@ def wrong_efforts() -> list[Case]:
         sent = one("/joint_states", 100.0, 0.7, 0.5)
         return [s._replace(fields=s.fields | {"effort": change(s.fields["effort"])}) for s in sent]
 
+    both = [s._replace(fields={name: [*value, *value] for name, value in s.fields.items()} | {
+        "name": ["a", "b"], "effort": [*s.fields["effort"], 0.0]}) for s in changed(np.asarray)]  # fmt: skip
     return [
+        Case("0 of one", sqlite, both, FRICTION, "", NOTHING, ("b: friction is not identified: its effort never",)),
         Case("sign", sqlite, changed(lambda e: -e), sine(0.7, 0.5), "as if the effort had the other sign"),
         Case("noise", by_rosbags, changed(lambda e: chance.normal(size=1)), sine(0.7, 0.5), "", NOTHING,
              ("a: friction is not identified: the errors are too large (dry friction ", "; the model leaves ")),
@@ -480,12 +483,12 @@ def other_units() -> list[Case]:
     degree = 180.0 / math.pi
     slow = one("/joint_states", 100.0, 0.7, 5.0)  # of 5 degrees
     alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
-    motor = [s._replace(fields={"name": ["motor1"], "position": s.fields["position"]})
-             for s in one("/joint_states", 100.0, 0.7, 20.0)]  # fmt: skip
+    often = [[s._replace(fields={"name": [name], "position": s.fields["position"]})
+              for s in one("/joint_states", 100.0, 0.7, 20.0)] for name in ("motor1", "left_wheel")]  # fmt: skip
     two, in_degrees = "one of the two has another unit", "if its position is in deg, give --unit position=deg"
     return [
         Case("position alone", by_rosbags, alone, {}, in_degrees, NOTHING, ()),
-        Case("a motor's shaft may turn often and fast", by_rosbags, motor, {}),
+        *(Case("a motor's shaft and a wheel may turn often and fast", by_rosbags, sent, {}) for sent in often),
         scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),
         scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "mm/s (shown in m/s", "rpm (shown in rad/s"),
         scaled("effort", 1e3, by_rosbags, "", "mN (shown in N", "mNm (shown in N m", "mA (shown in A"),

@@ -9,7 +9,7 @@ from wam_analysis.findings.efficiency import works
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import limit_cycle
-from wam_analysis.measures.response import step_response
+from wam_analysis.measures.response import force_response, step_response
 from wam_analysis.measures.runs import at_rest, missed, runs, usual_steps, without_turns
 from wam_analysis.measures.swings import swings
 from wam_studies.exact_cycles import last_cycle
@@ -80,6 +80,8 @@ def test_a_cycle_wider_than_the_band_does_not_settle_wherever_the_recording_stop
     time = np.arange(4000) / 1000.0
     cycle = 1.0 + 0.05 * np.sin(2.0 * math.pi * 4.0 * time + phase)
     assert step_response(time, cycle - np.exp(-30.0 * time), 0.0, 1.0, 0.02).settling == math.inf
+    fast = 1.0 + np.sin(2.0 * math.pi * time / 0.00525 + phase)  # of few samples in a period, which are no noise
+    assert force_response(time, fast, 0.0, 1.0, 1.0)[1].verdict is Verdict.LIMIT_CYCLE
 
 
 # limit cycles
@@ -123,18 +125,10 @@ def test_the_last_cycle_of_a_signal_without_noise_is_that_of_its_end():
     assert math.isnan(last_cycle(time, time).period)
 
 
-@pytest.mark.parametrize(
-    "value",
-    [
-        draws(4, 5000, 1.0),
-        np.exp(-np.arange(5000) / 400.0),
-        np.exp(-np.arange(5000) / 800.0) * np.sin(np.arange(5000) / 20.0),
-        np.ones(5000),
-        np.concatenate([np.zeros(2500), np.ones(2500)]),
-        random_walk(5000),
-    ],
-    ids=["noise", "creep", "ringing", "constant", "step", "random walk"],
-)
+@pytest.mark.parametrize("value", [
+    draws(4, 5000, 1.0), np.exp(-np.arange(5000) / 400.0), np.ones(5000), random_walk(5000),
+    np.exp(-np.arange(5000) / 800.0) * np.sin(np.arange(5000) / 20.0), np.concatenate([np.zeros(2500), np.ones(2500)]),
+], ids=["noise", "creep", "constant", "random walk", "ringing", "step"])  # fmt: skip
 def test_what_does_not_repeat_is_no_cycle(value):
     assert limit_cycle(np.arange(5000) / 1000.0, value).confidence < 0.5
 
@@ -337,22 +331,11 @@ def test_a_motion_that_has_ended_and_one_that_never_turned_do_not_cycle():
     assert swings(time, time, 0.05).number == 0
 
 
-@pytest.mark.parametrize(
-    ("length", "frequency", "spans", "drift"),
-    [
-        (60, 2.0, [(5, 55)], 0.0),
-        (60, 2.0, [(20, 35)], 0.0),
-        (60, 2.0, [(10, 40)], 0.0),
-        (20, 2.0, [(6, 14)], 0.0),
-        (60, 2.0, [(33, 58)], 0.0),
-        (60, 2.0, [(1, 58)], 0.0),
-        (60, 0.7, [(5, 55)], 0.0),
-        (60, 5.0, [(5, 55)], 0.0),
-        (60, 15.4, [(5, 55)], 0.0),
-        (60, 2.0, [(5, 15), (25, 40)], 0.0),
-        (60, 2.0, [(10, 40)], 0.02),
-    ],
-)
+@pytest.mark.parametrize(("length", "frequency", "spans", "drift"), [
+    (60, 2.0, [(5, 55)], 0.0), (60, 2.0, [(20, 35)], 0.0), (60, 2.0, [(10, 40)], 0.0), (20, 2.0, [(6, 14)], 0.0),
+    (60, 2.0, [(33, 58)], 0.0), (60, 2.0, [(1, 58)], 0.0), (60, 0.7, [(5, 55)], 0.0), (60, 5.0, [(5, 55)], 0.0),
+    (60, 15.4, [(5, 55)], 0.0), (60, 2.0, [(5, 15), (25, 40)], 0.0), (60, 2.0, [(10, 40)], 0.02),
+])  # fmt: skip
 def test_a_cycle_in_a_part_of_a_recording_is_found_with_its_ends(length, frequency, spans, drift):
     """A window that also held quiet parts was taken, the phase fitted over these too, and the cycle then lost."""
     time = np.arange(100 * length) / 100.0

@@ -256,7 +256,7 @@ def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(se
     recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
     assert math.isnan(forces_of(recording).get("press 4 N: error of the true force", math.nan))
     shown = told(recording.bag())
-    assert "force within 10 %: NOT EVALUATED, 1 of 2 forces shorter than 1 s" in shown
+    assert "force within 10 %: NOT EVALUATED, 1 of 2 forces constant for less than 1 s" in shown
     assert "Forces: 1 of 1 within 10 %, largest error with ripple 5.0 %." in shown
     is_hold = "press 4 N: 4 N commanded on outer_link for less than 1 s, so" in shown
     assert is_hold == (seconds > 0.3)  # else it may be part of a ramp
@@ -314,7 +314,7 @@ def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
     recording.set(recording.true, 9.4, 9.5, "outer_link", (0.0, 157.0, 0.0), 0.25)
     summary = AnalysedRecording(with_limits(recording))
     assert summary.unplanned.unknown == ""
-    answer = answers(summary)[-1]
+    answer = [*answers(summary)][-1]
     assert str(answer) == "without a commanded force, contacts stay below 90 N: NO (157 N)"
     said = "lift: TOO HARD: a contact with 157 N (true, at 9.60 s)"
     assert any(one.startswith(said) for one in section_of(with_limits(recording), "contact").wrong)
@@ -377,7 +377,7 @@ def test_where_the_allowed_force_is_not_known_no_contact_is_shown_to_be_soft_eno
     )
     for bag in (recording.bag(), odd):
         summary = AnalysedRecording(bag)
-        assert str(answers(summary)[-1]) == NO_LIMIT
+        assert str([*answers(summary)][-1]) == NO_LIMIT
         assert any(one.startswith("It is not known whether a contact") for one in section_of(bag, "contact").wrong)
     nothing = nothing_but((1.0, 1.0, "base", 0.0), (1.0, 1.0, "base", 0.0))
     assert AnalysedRecording(nothing.bag()).unplanned == ((), "")

@@ -69,11 +69,6 @@ class Analysis(NamedTuple):
         return provenance(self.recording)
 
     @property
-    def has_failed(self) -> bool:
-        """Whether the run that was recorded failed, or was cut off."""
-        return bool(self.recording.failure)
-
-    @property
     def unmet(self) -> tuple[str, ...]:
         """A failure of the run, and those answers on its steps that are no."""
         failed = [f"FAILED: {why}" for why in [self.recording.failure] if why]

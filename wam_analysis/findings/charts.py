@@ -87,7 +87,7 @@ def _extent(one: Source) -> float:
     """How far a source moved."""
     values = next(iter(one.values.values()), np.empty(0))
     known = values[np.isfinite(values)]
-    return float(known.max(initial=-np.inf) - known.min(initial=np.inf))
+    return float(np.ptp(known)) if len(known) else 0.0
 
 
 def _forces_over_time(traces: Traces) -> Iterator[Chart]:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.stick_slip import rest_speed
-from wam_analysis.foreign.sources import Piece, Source, pieces, rests, ways
+from wam_analysis.findings.stick_slip import contradiction, rest_speed
+from wam_analysis.foreign.sources import Source, pieces, rests
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.columns import JOINT_FIELDS
 
@@ -18,6 +18,11 @@ RECORD = (
     "To identify friction, record position and effort of each joint at 50 Hz or more, in motion to both sides, slow "
     "and fast, for some ten seconds, while nothing touches the arm."
 )
+FIT = (
+    "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where it fits "
+    "better, a delay. The standard errors include what it does not explain."
+)
+NO_FRICTION = "The friction of the joints cannot be identified: no recorded effort shows friction."
 
 
 def effort_section(recording: AnalysedRecording) -> Section:
@@ -39,8 +44,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
         )
         if not _is_known(found):
-            acts = _acts(one) if "effort" in one.values else one.name not in driven
-            if driven and acts and one.values.keys() != {"effort"}:
+            if driven and ("effort" in one.values or one.name not in driven) and one.values.keys() != {"effort"}:
                 which = wrong if found.dynamic.is_negative else doubts
                 which.append(f"{one.label}: friction is not identified: {_lacking(one, every, found.unexplained)}.")
             continue
@@ -58,20 +62,14 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
-    if not sentences:
-        why = "The friction of the joints cannot be identified: no recorded effort shows friction."
-        return Section("friction", "Friction", (why, RECORD, *doubts, *wrong), wrong=wrong)
-    doubts += [RECORD] * bool(doubts)
-    assumed = (
-        "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where it fits "
-        "better, a delay. The standard errors include what it does not explain."
-    )
+    doubts += [RECORD] * bool(doubts or not sentences)
     if alone:
         doubts.append(
             f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "
             "friction from a delay of the effort."
         )
-    return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, brief, wrong)
+    stated = (FIT if sentences else NO_FRICTION, *sentences, *doubts, *wrong)
+    return Section("friction", "Friction", stated, findings, brief, wrong)
 
 
 def _acts(source: Source) -> bool:
@@ -91,6 +89,8 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
         return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
     if "effort" not in one.values or not len(one.only(*one.values).time):
         return f"no message has all of {', '.join({**one.values, 'effort': 0})}"
+    if not _acts(one):
+        return "its effort never changes"
     if math.isnan(numbers[0][2].value):
         part = f"it moved in one direction for more than {100.0 * (1.0 - SHAFT.both_ways):g} % of its way"
         return f"{part}, or for fewer than {SHAFT.fewest_samples} samples apart from its reversals"
@@ -108,50 +108,6 @@ def limited(source: Source, quantity: str = "effort") -> str:
         return ""
     low, high = (shown(bound, source.units[quantity]) for bound in bounds)
     return f"the {quantity} is exactly {low} or {high} in {100.0 * share:.0f} % of the messages, as if it was limited"
-
-
-def contradiction(source: Source) -> str:
-    """How the recorded velocity is not the rate of the position, '' where the two agree."""
-    if not {"position", "velocity"} <= source.values.keys():
-        return ""
-    factor = source.velocity_factor
-    if abs(factor - 1.0) > SHAFT.agree:
-        return (
-            f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "
-            "sign, or is of another joint"
-        )
-    lost = (_lost_way(piece, source.units["position"]) for piece in pieces(source, "position", "velocity"))
-    return next(filter(None, lost), "")
-
-
-def _lost_way(piece: Piece, unit: str) -> str:
-    """Where the position moves least as the velocity has it, and by how much each; '' where they agree.
-
-    A velocity that is late differs only as far as it changes meanwhile; one of another scale, or of the other side of a
-    play, differs alike all the time, and by less than an encoder that slips now and then.
-    """
-    time, velocity, period = piece.time, piece.values["velocity"], piece.period
-    width = max(1, round(SHAFT.way / period))
-    if len(time) <= width:
-        return ""
-    moved, by = ways(piece, width)
-    path = period * np.concatenate(([0.0], np.cumsum(np.abs(velocity[1:]))))
-    far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
-    columns = np.column_stack([by, change])
-    left = np.abs(moved - columns @ np.linalg.lstsq(columns, moved, rcond=None)[0])
-    usual = STREAM.zero * np.median(left[far >= np.median(far)])
-    excess = np.maximum(np.abs(moved - by) - SHAFT.agree * far, left - np.maximum(SHAFT.late * far, usual))
-    noise = piece.noise["position"] + piece.noise["velocity"] * period * math.sqrt(width)
-    allowed = SHAFT.joint_rest * SHAFT.way + max(SHAFT.longest_effort_lag, period) * np.abs(change)
-    excess -= allowed + SHAFT.noisy * noise
-    if 2 * np.sum(excess > 0.0) < width:
-        return ""
-    worst = int(np.argmax(excess))
-    return (
-        f"in the {SHAFT.way:g} s from {time[worst]:.4g} s, the position changes by {shown(moved[worst], unit)}, the "
-        f"integral of the velocity by {shown(by[worst], unit)}; an encoder slips or stops, or one of the two is of "
-        "something else"
-    )
 
 
 def _is_known(found: Friction) -> bool:

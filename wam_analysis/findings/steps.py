@@ -61,7 +61,7 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     """Whether the commands of a scenario were carried out; None without a scenario."""
     if not recording.steps:
         return None
-    (brief, why), answers = recording.unassessed, verdict(recording)
+    (brief, why), answers = recording.unassessed, [*verdict(recording)]
     failed = [f"{one.question} ({one.worst})" for one in answers if one.result is VerdictResult.NO]
     wrong = [f"Failed: {', '.join(failed)}."] if failed else []
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
@@ -79,12 +79,8 @@ def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
     return found
 
 
-def verdict(recording: AnalysedRecording) -> tuple[VerdictAnswer, ...]:
+def verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     """Whether postures, forces and contacts were right, each with its worst value, and what was too hard in motion."""
-    return tuple(_answers(recording))
-
-
-def _answers(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     if errors := _posture_errors(recording):
         yield _posture_verdict(errors)
     yield from _force_verdict(recording)
@@ -159,7 +155,7 @@ def _force_verdict(recording: AnalysedRecording) -> Iterator[VerdictAnswer]:
     elif held or brief:
         errors = [100.0 * one.accuracy["true"].smallest / one.hold.commanded for one in done] + [math.nan] * brief
         short = brief + sum(one.hold.is_short for one in done)
-        remark = f"{short} of {len(held) + brief} forces shorter than {STEADY:g} s" * bool(short)
+        remark = f"{short} of {len(held) + brief} forces constant for less than {STEADY:g} s" * bool(short)
         yield _answer(question, errors, HOLD.force_tolerance, "{} %")._replace(remark=remark)
 
 

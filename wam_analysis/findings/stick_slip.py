@@ -1,21 +1,24 @@
 """Section about stick and slip."""
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests
+from wam_analysis.findings.topics import in_words
+from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests, ways
 from wam_analysis.measures.runs import at_rest, runs, without_turns
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import LAYOUT, SHAFT
+from wam_analysis.thresholds import LAYOUT, SHAFT, STREAM
 from wam_bag.arrays import Numbers
 
 
 def stick_section(recording: AnalysedRecording) -> Section:
-    """How long each motor and joint was at rest, and how often it moved; whether it sticks under a command."""
+    """How long each motor and joint was at rest, how often it moved; whether it sticks, or an encoder slips."""
     sentences, findings, verdict = [], [], []
+    wrong = [] if recording.is_foreign else [*_slipped(recording.states)]
     for one in recording.states:
         command = recording.command_of(one)
         # not a position that is sent once and held
@@ -45,8 +48,17 @@ def stick_section(recording: AnalysedRecording) -> Section:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
-    stated = sentences or ["No velocity was recorded."]
-    return Section("stick_slip", "Stick and slip", stated, findings, verdict)
+    stated = [*(sentences or ["No velocity was recorded."]), *wrong]
+    return Section("stick_slip", "Stick and slip", stated, findings, verdict, wrong)
+
+
+def _slipped(states: Iterable[Source]) -> Iterator[str]:
+    """Where positions move otherwise than their velocities: at once, or in a second."""
+    for one in states:
+        moved = tuple(each for each in one.treated if each.quantity == "position")
+        yield from in_words([one._replace(treated=moved)])
+        if unlike := contradiction(one):
+            yield f"{one.label}: {unlike}."
 
 
 class Sticking(NamedTuple):
@@ -125,3 +137,46 @@ def _commanded_speed(command: Source, time: Numbers) -> Numbers:
     if len(position.time) < SHAFT.fewest_samples:
         return np.zeros(len(time))
     return np.interp(time, position.time, np.gradient(position.values["position"], position.time))
+
+
+def contradiction(source: Source) -> str:
+    """How the recorded velocity is not the rate of the position, '' where the two agree."""
+    if not {"position", "velocity"} <= source.values.keys():
+        return ""
+    factor = source.velocity_factor
+    if abs(factor - 1.0) > SHAFT.agree:
+        return (
+            f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "
+            "sign, or is of another joint"
+        )
+    lost = (_lost_way(piece, source.units["position"]) for piece in pieces(source, "position", "velocity"))
+    return next(filter(None, lost), "")
+
+
+def _lost_way(piece: Piece, unit: str) -> str:
+    """Where the position moves least as the velocity has it, and by how much each; '' where they agree.
+
+    A velocity that is late differs only as far as it changes meanwhile; one of another scale, or of the other side of a
+    play, differs alike all the time, and by less than an encoder that slips now and then.
+    """
+    time, velocity, period = piece.time, piece.values["velocity"], piece.period
+    width = max(1, round(SHAFT.way / period))
+    if len(time) <= width:
+        return ""
+    moved, by = ways(piece, width)
+    path = period * np.concatenate(([0.0], np.cumsum(np.abs(velocity[1:]))))
+    far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
+    left = np.abs(moved - by)
+    usual = STREAM.zero * np.median(left[far >= np.median(far)])
+    excess = left - np.minimum(SHAFT.agree * far, np.maximum(SHAFT.late * far, usual))
+    noise = piece.noise["position"] + piece.noise["velocity"] * period * math.sqrt(width)
+    allowed = SHAFT.joint_rest * SHAFT.way + max(SHAFT.longest_effort_lag, period) * np.abs(change)
+    excess -= allowed + SHAFT.noisy * noise
+    if 2 * np.sum(excess > 0.0) < width:
+        return ""
+    worst = int(np.argmax(excess))
+    return (
+        f"in the {SHAFT.way:g} s from {time[worst]:.4g} s, the position changes by {shown(moved[worst], unit)}, the "
+        f"integral of the velocity by {shown(by[worst], unit)}; an encoder slips or stops, or one of the two is of "
+        "something else"
+    )

@@ -71,6 +71,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
         if received is not None:
             waits = np.diff(np.sort(received).astype(np.float64)) / 1e9
             findings += [
+                Finding(f"{name}: period of the receptions", "ms", 1e3 * float(np.mean(waits))),
                 Finding(f"{name}: reception jitter", "ms", 1e3 * float(np.std(waits)), note="standard deviation"),
                 Finding(f"{name}: longest gap between receptions", "s", float(np.max(waits))),
             ]
@@ -78,9 +79,8 @@ def timing_section(recording: AnalysedRecording) -> Section:
             wrong.append(f"{name}: the period changes between {shown(period, 's')} and {shown(slowest, 's')}.")
         if lost:
             wrong.append(f"{name}: {lost} messages missing; longest gap: {shown(gap, 's')}.")
-    if recording.is_foreign:
-        stated = "No message is missing." if findings else "No stamped topic was recorded."
-        return Section("timing", "Timing", wrong or [stated], findings, wrong=wrong)
+    silent = "No message is missing." if findings else "No stamped topic was recorded."
+    sentences = wrong or [silent] * (recording.is_foreign or not findings)  # ours lists what is lost
     if timed := [facts for facts in recording.loop if RATE in facts]:
         last = timed[-1]
         findings.append(Finding("driver: rate", "Hz", float(last[RATE])))
@@ -89,14 +89,10 @@ def timing_section(recording: AnalysedRecording) -> Section:
             findings.append(Finding(f"driver: latency {p}", "us", median(values)))
         note = f"of {last.get('periods', '-')}"
         findings.append(Finding("driver: missed periods", "", float(last.get("missed periods", math.nan)), note=note))
-    sentences = [*wrong]
     if recording.mode == "lockstep":
-        sentences.append(
-            "Recorded in lockstep: the driver waited for every command, so reception times have no meaning."
-        )
-    if not findings:
-        sentences.append("No stamped topic of the loop was recorded.")
-    return Section("timing", "Timing of the loop", sentences, findings, (), wrong)
+        waited = "Recorded in lockstep: the driver waited for every command, so reception times have no meaning."
+        sentences = [*sentences, waited]
+    return Section("timing", "Timing", sentences, findings, wrong=wrong)
 
 
 def provenance(recording: AnalysedRecording) -> dict[str, str]:
@@ -114,8 +110,8 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
         "bag": str(bag.path),
         **({} if recording.is_foreign else {"arm": recording.namespace or "/"}),
         "mode": recording.mode,
-        "topics": _part_of(sum(count > 0 for count in read), len(whole)),
-        "messages": _part_of(sum(read), sum(whole.values())),
+        "topics": f"{sum(count > 0 for count in read)} of {len(whole)} needed and read",
+        "messages": f"{sum(read)} of {sum(whole.values())} needed and read",
         "lost": " ".join(recording.lost) or "none known",
         "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",
         **({"parameters, notes": "; ".join(recording.run.parameters.notes)} if recording.run.parameters.notes else {}),
@@ -123,9 +119,3 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
     }
     recorder = {key: value for key, value in metadata.items() if not key.startswith("/") and key != "mode"}
     return {**facts, **{f"recorded: {key}": value for key, value in recorder.items()}}
-
-
-def _part_of(read: int, all_of_them: int) -> str:
-    if read == all_of_them:
-        return str(read)
-    return f"{read} of {all_of_them}; the others are not needed and were not read"

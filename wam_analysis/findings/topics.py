@@ -23,7 +23,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
-    wrong = [*_treated(found), *(f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note)]
+    wrong = [*in_words(found), *(f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note)]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
         f"took turns; the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
@@ -52,13 +52,14 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
             yield f"{name}: {', '.join(none)} without a number for position, velocity or effort."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
         largest = _largest(np.sqrt(np.nansum(columns.force**2, axis=1)))
-        what = f"up to {shown(largest, 'N')}" if np.isfinite(columns.force).any() else "none of which is a number"
-        yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
+        known = np.isfinite(columns.force).any(axis=1)
+        what = f"up to {shown(largest, 'N')}" if known.any() else "none of which is a number"
+        yield f"{name}: {np.count_nonzero(known) or len(columns.force)} forces, {what}."
 
 
 def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Source]) -> Iterator[str]:
     """Which values may be in another unit than that of ROS; a velocity that is the rate of a position is in none."""
-    slow = [not is_motor(joint) for joint in columns.names] if isinstance(columns, JointColumns) else []
+    slow = [not turns_often(joint) for joint in columns.names] if isinstance(columns, JointColumns) else []
     for quantity, most in UNUSUAL.items():
         values = getattr(columns, quantity, np.empty(0))
         if slow and values.size and quantity in ("position", "velocity"):
@@ -84,16 +85,16 @@ def _largest(values: ArrayLike) -> float:
 def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
     """Which joints would move faster than few do, where their velocity was not recorded."""
     for one in found:
-        if _lacks_velocity(one) and "position" not in given.units and not is_motor(one.name):
+        if _lacks_velocity(one) and "position" not in given.units and not turns_often(one.name):
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
             if max(speeds, default=0.0) > UNUSUAL["velocity"]:
                 fast = f"moves at up to {shown(float(max(speeds)), 'rad/s')}"
                 yield f"{one.label}: {fast}; if its position is in deg, give --unit position=deg."
 
 
-def is_motor(name: str) -> bool:
-    """Whether a joint is the shaft of a motor, which turns often and fast."""
-    return "motor" in name.lower()
+def turns_often(name: str) -> bool:
+    """Whether a joint is a wheel or the shaft of a motor, which turns often and fast."""
+    return any(word in name.lower() for word in ("motor", "wheel"))
 
 
 def _lacks_velocity(one: Source) -> bool:
@@ -101,7 +102,7 @@ def _lacks_velocity(one: Source) -> bool:
     return "position" in one.values and "velocity" not in one.values and not one.is_command
 
 
-def _treated(found: Sequence[Source]) -> list[str]:
+def in_words(found: Sequence[Source]) -> list[str]:
     """What was done to raw values, a sentence for all joints of a topic and quantities to which the same was done."""
     alike: dict[tuple[str, Treated], tuple[list[Source], list[str]]] = {}
     for one in found:

@@ -239,16 +239,19 @@ def _waves(signals: TransmissionSignals, motor: int, shaft: str, parameters: Pre
 
 
 def _unrecorded(signals: TransmissionSignals) -> Numbers:
-    """What loads may differ by from the recorded ones, (k, n, 2), N m: within a period, and between their samples.
+    """What loads may differ by from the recorded ones, (k, n, 3), N m: within a period, between samples, in the joints.
 
     They are those of an instant within half a period of the middle of one. Between their samples, a motor's torque
     less that of its rotor shows what a straight line misses: cables swing in time with commands that are as far apart.
+    The viscous friction of a joint counts as its motor's, but the cables let it move otherwise than its motor.
     """
     time, rows = signals.time, np.unique([0, *np.flatnonzero(signals.sampled)])
     passed = signals.torque - signals.rotors
     straight = np.column_stack([np.interp(time, time[rows], one[rows]) for one in passed.T])
     late = 0.5 * np.median(np.diff(time)) * np.gradient(signals.load, time, axis=0)
-    return np.stack([late, passed - straight], axis=2)
+    matrix = TransmissionMap.of(signals.arm).joint_from_motor
+    apart = np.nan_to_num(signals.joint_velocity - signals.velocity @ matrix.T) * (signals.load_from != CABLE)
+    return np.stack([late, passed - straight, apart * signals.arm.joints.viscous_friction @ matrix], axis=2)
 
 
 def _friction_of_joints(signals: TransmissionSignals) -> dict[str, Friction]:

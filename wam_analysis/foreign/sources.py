@@ -379,9 +379,8 @@ def _treated(one: Source) -> Source:
             size = np.max(np.abs(value[rows] - mean))
             treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
     if "position" in measured:
-        if any(each.what is Treatment.SPIKES for each in treated):
-            shown = one._replace(values=values).only("position", "velocity")
-            moves = _jumps(shown)
+        shown = one._replace(values=values).only("position", "velocity")
+        moves = _jumps(shown)  # again, without the spikes
         if len(sizes := moves[moves != 0.0]):
             values["position"] = values["position"] - np.cumsum(moves)[row_at(shown.time, one.time)]
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
@@ -486,13 +485,15 @@ def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None 
     steps, waits, finest = np.diff(value), np.diff(time), 0.0
     if velocity is not None:
         moved = _moved(time, velocity)
+        fastest = np.maximum(np.abs(velocity[1:]), np.abs(velocity[:-1]))  # of both: it may turn at once
     else:
         rates = np.pad(steps / waits, STREAM.around, "edge")
-        moved = np.median(sliding_window_view(rates, 2 * STREAM.around + 1), axis=1) * waits
+        rate = np.median(sliding_window_view(rates, 2 * STREAM.around + 1), axis=1)
+        moved, fastest = rate * waits, np.abs(rate)
         finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
     rest = steps - moved
     usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
-    is_jump = np.abs(rest) > np.maximum(STREAM.beyond * np.abs(moved), max(usual, least))
+    is_jump = np.abs(rest) > np.maximum(STREAM.beyond * fastest * waits, max(usual, least))
     result[1:] = np.where(is_jump & ~after_gaps(time)[1:], rest, 0.0)
     return result
 
@@ -561,11 +562,7 @@ def resolution(value: Numbers) -> float:
     # from place to place, to stay there, as a gripper does: no flicker of an encoder
     is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(np.diff(value)) < np.std(value)
     is_rounded = not is_step and np.all(np.abs(counts - np.rint(counts)) < 0.05) and np.median(counts) < 1e3
-    sd = noise(value)
-    # of higher differences, too: with few samples in a period, as of a vibration, the second ones are of the motion
-    if len(value) > SHAFT.fewest_samples:
-        sd = min(sd, *(noise(np.diff(value, n=m - 2)) * math.sqrt(6.0 / math.comb(2 * m, m)) for m in (4, 6, 8)))
-    return max(sd, quantum / math.sqrt(12.0) if is_rounded else 0.0)
+    return max(noise(value), quantum / math.sqrt(12.0) if is_rounded else 0.0)
 
 
 def rests(source: Source) -> bool:

@@ -82,7 +82,7 @@ def loaded(run: RecordedRun) -> Iterator[str]:
         lasted = np.clip(np.diff(forces.stamp_ns, append=states.stamp_ns[-1]), 0, STREAM.held)
         share = float(np.sum(lasted[np.any(forces.force != 0.0, axis=1)]) / max(np.ptp(states.stamp_ns), 1))
         if share > IDENTIFY.least_contact:
-            yield f"{what} in {100.0 * share:.2g} %"
+            yield f"{what} in {100.0 * share:.3g} %"
 
 
 def motion(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotionSamples:

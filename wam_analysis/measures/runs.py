@@ -1,5 +1,7 @@
 """Intervals in which a condition holds, usual and missing times, and the noise of a signal."""
 
+import math
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -154,17 +156,18 @@ def without_turns(
 
 
 def noise(value: Numbers) -> float:
-    """Standard deviation of the noise of a signal, from second differences.
+    """Standard deviation of the noise of a signal, from its second and higher differences.
 
-    Robust against jumps, since it is the median of the absolute second difference; smooth motion adds nothing.
+    Robust against jumps, since it is a median of absolute differences; smooth motion adds nothing. With few samples in
+    a period, as of a vibration, the second differences are of the motion.
 
     Parameters
     ----------
     value : (n,), at a constant rate.
     """
-    if len(value) < 3:
-        return 0.0
-    return float(np.median(np.abs(np.diff(value, 2)))) / 0.6745 / np.sqrt(6.0)
+    orders = (2, 4, 6, 8)[: (len(value) - 1) // 2]
+    sizes = (float(np.median(np.abs(np.diff(value, m)))) / math.sqrt(math.comb(2 * m, m)) for m in orders)
+    return min(sizes, default=0.0) / 0.6745
 
 
 def smoothed(value: Numbers, width: int) -> Numbers:

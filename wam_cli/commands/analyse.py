@@ -63,7 +63,7 @@ def run(given: argparse.Namespace) -> int:
         progress("drawing")
         given.html.write_text(page(analysis), encoding="utf-8")
         progress(f"wrote {given.html}")
-    return int(analysis.has_failed)
+    return int(bool(analysis.recording.failure))
 
 
 def _steps(given: argparse.Namespace) -> int:

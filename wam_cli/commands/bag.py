@@ -76,7 +76,8 @@ def described(found: Bag) -> list[str]:
     seconds = (found.last - found.first) / 1e9
     lost = found.losses
     lines = [f"INCOMPLETE: {line}" for line in lost.sentences(found.first)]
-    lines += [f"{file}  {file.stat().st_size / 1e6:.1f} MB" for file in files(found.path)]
+    every = [one for file in files(found.path) for one in sorted(file.glob("*")) or [file]]  # it may be a directory
+    lines += [f"{file}  {file.stat().st_size / 1e6:.1f} MB" for file in every]
     lines.append(f"from {_time(found.first)}, {seconds:.3f} s, {sum(found.counts.values())} messages")
     if RECORDING in found.metadata or PARAMETERS in found.attachments:
         lines.append(f"recorded in {found.mode} mode, lost: {_lost(found, lost)}")
