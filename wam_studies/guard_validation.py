@@ -1,7 +1,7 @@
 """Monte Carlo validation of the stability guard: random parameter sets, its verdicts, and simulated responses.
 
-Two references that the guard does not use: the exact integrator, with steps and initial velocities of its own, for
-`wam_theory.friction_verdict`; and the testbed in MuJoCo, driver and velocity loop included, for
+Two references: the exact integrator, which `wam_theory.friction_verdict` uses, too, with steps, contacts and initial
+velocities of its own; and, not used by any guard, the testbed in MuJoCo, driver and velocity loop included, for
 `wam_control.force.stability_guard`.
 """
 

@@ -1,5 +1,6 @@
-"""Arguments of the formulas as arrays, checked for their range."""
+"""Arguments of the formulas as arrays, checked for their range, and quotients that may be infinite."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -39,6 +40,18 @@ def finite(**arguments: ArrayLike) -> list[Array]:
         if one is not finite.
     """
     return _checked(arguments, np.isfinite, "a number")
+
+
+def quotient(numerator: ArrayLike, denominator: ArrayLike, otherwise: float = math.inf) -> Array:
+    """Quotient of arrays or numbers.
+
+    Parameters
+    ----------
+    numerator, denominator : of any shape that broadcasts.
+    otherwise : what the quotient is where the denominator is not above zero.
+    """
+    above, below = np.broadcast_arrays(numerator, denominator)
+    return np.divide(above, below, out=np.full(below.shape, otherwise), where=below > 0.0)
 
 
 def _checked(arguments: dict[str, ArrayLike], allowed: Callable[[Array], NDArray[np.bool_]], what: str) -> list[Array]:

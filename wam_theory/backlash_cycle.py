@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_theory.arguments import Array
+from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.friction_model import require
 from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
 
@@ -22,7 +23,8 @@ class GearedTorqueLoop(NamedTuple):
     ----------
     stiffness, play : of the gear at its motor, N m/rad and rad, above zero.
     inertia, damping : of the motor, with the damping of its own velocity feedback, kg m^2 and N m s/rad.
-    proportional, integral, derivative : G, G_I in 1/s and G_D in s, of the torque.
+    proportional, integral : G, above -1, and G_I, 1/s, zero or more, of the torque.
+    derivative : G_D of the torque, s, above zero.
     """
 
     stiffness: float
@@ -63,8 +65,11 @@ def exact_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
     Raises
     ------
     ValueError
-        if no cycle has settled after 5000 half cycles.
+        if a value of the loop is out of its range, or no cycle has settled after 5000 half cycles.
     """
+    above_zero(stiffness=loop.stiffness, play=loop.play, inertia=loop.inertia, derivative=loop.derivative)
+    zero_or_more(damping=loop.damping, integral=loop.integral)
+    require("proportional", loop.proportional, above=-1.0)
     if not 0.0 < loop.critical_gain < 1.0:
         return NO_CYCLE
     n, proportional = loop.critical_gain, loop.proportional  # by the describing function omega^2 = N k (1 + G)/J

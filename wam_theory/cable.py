@@ -6,7 +6,7 @@ A circuit has two strands under a pretension T0; torque tightens one and loosens
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.arguments import Array, above_zero, finite, zero_or_more
 
 
 def stage_compliance(
@@ -62,7 +62,7 @@ def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLi
     pretension : T0, N.
     radius : of the pinion, m.
     """
-    x = np.asarray(stretch, dtype=float)
+    (x,) = finite(stretch=stretch)
     stiffness, radius = above_zero(stiffness=stiffness, radius=radius)
     (pretension,) = zero_or_more(pretension=pretension)
     half = stiffness / 2.0
@@ -79,7 +79,7 @@ def play_torque(stretch: ArrayLike, stiffness: ArrayLike, backlash: ArrayLike) -
     stiffness : k, N m/rad.
     backlash : play, rad, zero or more.
     """
-    x = np.asarray(stretch, dtype=float)
+    (x,) = finite(stretch=stretch)
     (k,) = above_zero(stiffness=stiffness)
     (play,) = zero_or_more(backlash=backlash)
     return np.asarray(np.sign(x) * k * np.maximum(np.abs(x) - 0.5 * play, 0.0))
@@ -113,7 +113,8 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
     """
     (radius,) = above_zero(radius=radius)
     (pretension,) = zero_or_more(pretension=pretension)
-    difference = np.abs(np.asarray(torque, dtype=float)) / radius
+    (torque,) = finite(torque=torque)
+    difference = np.abs(torque) / radius
     slack = difference > 2.0 * pretension
     return (
         np.where(slack, difference, pretension + difference / 2.0),
@@ -130,7 +131,8 @@ def stage_loss(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike, circuits: Ar
     radius, ea, circuits, ratio : of the stage as in `stage_compliance`.
     """
     radius, ea, circuits, ratio = above_zero(radius=radius, ea=ea, circuits=circuits, ratio=ratio)
-    return np.abs(np.asarray(torque, dtype=float)) * ratio / (radius * ea * circuits)
+    (torque,) = finite(torque=torque)
+    return np.abs(torque) * ratio / (radius * ea * circuits)
 
 
 def efficiency(losses: ArrayLike) -> float:
@@ -161,7 +163,8 @@ def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike
     """
     radius, ea = above_zero(radius=radius, ea=ea)
     (travel,) = zero_or_more(travel=travel)
-    return travel * np.asarray(torque, dtype=float) / (radius * ea)
+    (torque,) = finite(torque=torque)
+    return travel * torque / (radius * ea)
 
 
 def eccentric_ripple(eccentricity: ArrayLike, pretension: ArrayLike, angle: ArrayLike) -> Array:
@@ -174,4 +177,5 @@ def eccentric_ripple(eccentricity: ArrayLike, pretension: ArrayLike, angle: Arra
     angle : theta of the pulley, rad.
     """
     eccentricity, pretension = zero_or_more(eccentricity=eccentricity, pretension=pretension)
-    return 2.0 * eccentricity * pretension * np.sin(np.asarray(angle, dtype=float))
+    (angle,) = finite(angle=angle)
+    return 2.0 * eccentricity * pretension * np.sin(angle)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.arguments import Array, above_zero
+from wam_theory.arguments import Array, above_zero, quotient
 from wam_theory.linear_loop import characteristic_polynomial, gain_ratio, polynomial_at
 
 
@@ -94,5 +94,4 @@ def predicted_unstable_cycle(
     gamma = gain_ratio(gain, inertia, damping, transmission_stiffness, contact_stiffness)
     j, b, ktr, kc = (np.asarray(a, dtype=float) for a in (inertia, damping, transmission_stiffness, contact_stiffness))
     gamma, natural, size = np.broadcast_arrays(gamma, np.sqrt((ktr + kc) / j), 4.0 * f * kc / (math.pi * b))
-    force = np.divide(size, natural * (gamma - 1.0), out=np.full(gamma.shape, math.inf), where=gamma > 1.0)
-    return UnstableCycle(force, np.where(gamma > 1.0, natural, math.nan))
+    return UnstableCycle(quotient(size, natural * (gamma - 1.0)), np.where(gamma > 1.0, natural, math.nan))

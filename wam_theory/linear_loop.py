@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.arguments import Array, above_zero, finite, zero_or_more
 from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
 
@@ -65,7 +65,8 @@ def proportional_error(force: ArrayLike, proportional_gain: ArrayLike, stiffness
     """
     (gain,) = zero_or_more(proportional_gain=proportional_gain)
     (k,) = above_zero(stiffness=stiffness)
-    return np.asarray(force, dtype=float) / (1.0 + gain * k)
+    (desired,) = finite(force=force)
+    return desired / (1.0 + gain * k)
 
 
 def integral_time_constant(gain: ArrayLike, stiffness: ArrayLike) -> Array:

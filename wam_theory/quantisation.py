@@ -8,7 +8,7 @@ slow down, because the error does not fall below what is left of a step.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_theory.arguments import Array, above_zero
+from wam_theory.arguments import Array, above_zero, finite
 
 
 def threshold(desired: ArrayLike, step: ArrayLike) -> Array:
@@ -20,7 +20,8 @@ def threshold(desired: ArrayLike, step: ArrayLike) -> Array:
     step : of the measured force, in the same unit, above zero.
     """
     (step,) = above_zero(step=step)
-    return np.asarray((np.floor(np.asarray(desired, dtype=float) / step) + 0.5) * step)
+    (wanted,) = finite(desired=desired)
+    return np.asarray((np.floor(wanted / step) + 0.5) * step)
 
 
 def hunting(step: ArrayLike, gamma: ArrayLike, desired: ArrayLike) -> Array:
@@ -32,12 +33,12 @@ def hunting(step: ArrayLike, gamma: ArrayLike, desired: ArrayLike) -> Array:
     Parameters
     ----------
     step : of the measured force, above zero.
-    gamma : of (5.15), below 1.
+    gamma : of (5.15); from 1 on the result is infinite.
     desired : F_des, in the unit of step.
     """
     step, gamma = above_zero(step=step, gamma=gamma)
-    share = np.mod(np.asarray(desired, dtype=float) / step, 1.0)
-    return np.asarray(4.0 / np.pi * gamma * step * np.sin(np.pi * share))
+    (wanted,) = finite(desired=desired)
+    return np.where(gamma < 1.0, 4.0 / np.pi * gamma * step * np.sin(np.pi * np.mod(wanted / step, 1.0)), np.inf)
 
 
 def quantised_cycle_period(
@@ -56,7 +57,8 @@ def quantised_cycle_period(
     g, k, friction, step = above_zero(
         gain=gain, transmission_stiffness=transmission_stiffness, friction=friction, step=step
     )
-    below = np.mod(np.asarray(desired, dtype=float), step)
+    (wanted,) = finite(desired=desired)
+    below = np.mod(wanted, step)
     if np.any(below == 0.0):
         raise ValueError(f"desired is a multiple of step, {step.tolist()!r}: there the loop is at rest")
     return np.asarray(2.0 * friction / (g * k) * (1.0 / below + 1.0 / (step - below)))

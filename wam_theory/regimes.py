@@ -22,7 +22,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.arguments import Array, above_zero, finite, quotient, zero_or_more
 from wam_theory.half_cycle import half_cycle
 
 
@@ -47,14 +47,15 @@ def gamma_a(zeta: ArrayLike) -> Array:
     """Value of gamma below which a slip creeps to F_des and never stops; not in print.
 
     Exact for every zeta: 1/3 - 8 zeta^2/27, where the real mode of (5.14) is as fast as the pair; above
-    zeta = sqrt(3)/2, where the pair is real at first, plus ((4 zeta^2/3 - 1)/3)^(3/2)/zeta.
+    zeta = sqrt(3)/2, where the pair is real at first, r (1 - zeta r)/(3 zeta), r the rate of two equal modes.
 
     Parameters
     ----------
     zeta : (5.12), above zero.
     """
     (z,) = above_zero(zeta=zeta)
-    return 1.0 / 3.0 - 8.0 * z * z / 27.0 + np.maximum((4.0 * z * z / 3.0 - 1.0) / 3.0, 0.0) ** 1.5 / z
+    rate = 1.0 / (2.0 * z + np.sqrt(np.maximum(4.0 * z * z - 3.0, 0.0)))
+    return np.where(z < math.sqrt(0.75), 1.0 / 3.0 - 8.0 * z * z / 27.0, rate * (1.0 - z * rate) / (3.0 * z))
 
 
 def gamma_b(zeta: ArrayLike) -> Array:
@@ -180,8 +181,7 @@ def spin_up_time(
     ratio = np.array([-slip.error for slip in slips], dtype=float).reshape(a.shape)
     relief = np.array([slip.acceleration for slip in slips], dtype=float).reshape(a.shape) * (ktr + kc) / kc * e
     distance = np.where(ratio > 0.0, 2.0 * f - relief, relief)
-    distance, speed = np.broadcast_arrays(np.where(relief > 2.0 * f, 0.0, distance), g * ktr * np.abs(ratio) * e)
-    return np.divide(distance, speed, out=np.full(distance.shape, math.inf), where=speed > 0.0)
+    return quotient(np.where(relief > 2.0 * f, 0.0, distance), g * ktr * np.abs(ratio) * e)
 
 
 def actuator_cycle(friction: ArrayLike, transmission_stiffness: ArrayLike, gamma: ArrayLike, zeta: ArrayLike) -> Array:
@@ -232,4 +232,5 @@ def actuator_cycle_power(gain: ArrayLike, error: ArrayLike, friction: ArrayLike)
     """
     (g,) = above_zero(gain=gain)
     (f,) = zero_or_more(friction=friction)
-    return g * np.abs(np.asarray(error, dtype=float)) * f / 4.0
+    (e,) = finite(error=error)
+    return g * np.abs(e) * f / 4.0

@@ -97,7 +97,7 @@ def force_resonances(
     """Resonances of motor, cable, link and contact, undamped, (4.4).
 
     Roots of the denominator of `force_transfer`.  The lower root is computed as 2c/(B + sqrt(B^2 - 4c)),
-    without the cancellation of the printed form.
+    without the cancellation of the printed form, and B^2 - 4c as a sum of squares, which is never below zero.
 
     Parameters
     ----------
@@ -113,10 +113,9 @@ def force_resonances(
         if an argument is not above zero.
     """
     jm, jl, ktr, kc, n = _parts(motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio)
-    b = kc / jl + ktr / jm + n * n * ktr / jl
-    c = ktr * kc / (jm * jl)
-    root = np.sqrt(b * b - 4.0 * c)
-    return Resonances(np.sqrt(2.0 * c / (b + root)), np.sqrt((b + root) / 2.0))
+    link, rotor, coupled = kc / jl, ktr / jm, n * n * ktr / jl
+    twice = link + rotor + coupled + np.hypot(link + coupled - rotor, 2.0 * np.sqrt(coupled * rotor))
+    return Resonances(np.sqrt(2.0 * link * rotor / twice), np.sqrt(twice / 2.0))
 
 
 def soft_contact_bandwidth(

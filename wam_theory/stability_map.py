@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.many_slips import Array, Modes, modes, slip
+from wam_theory.arguments import Array, above_zero
+from wam_theory.many_slips import Modes, modes, slip
 from wam_theory.thresholds import SEARCH
 
 
@@ -44,16 +45,12 @@ def largest_stable_steps(
     ValueError
         if an argument is out of its range.
     """
-    given = {"gamma": gamma, "zeta": zeta, "stiffness_ratio": stiffness_ratio, "stiction": stiction, "rtol": rtol}
-    for name, value in given.items():
-        array = np.asarray(value, dtype=float)
-        if not np.all(np.isfinite(array) & (array > 0.0)):
-            raise ValueError(f"{name} is {value!r}; it must be finite and above zero")
-    if not np.all(np.asarray(stiction) >= 1.0):
-        raise ValueError(f"stiction is {stiction!r}, F_static over F_dynamic; it must be at least 1")
+    above_zero(rtol=rtol)
     g, z, ratio, s = np.broadcast_arrays(
-        *(np.asarray(a, dtype=float) for a in (gamma, zeta, stiffness_ratio, stiction))
+        *above_zero(gamma=gamma, zeta=zeta, stiffness_ratio=stiffness_ratio, stiction=stiction)
     )
+    if not np.all(s >= 1.0):
+        raise ValueError(f"stiction is {stiction!r}, F_static over F_dynamic; it must be at least 1")
     steps = np.full(g.size, math.inf)
     beyond = np.flatnonzero(g.ravel() > 1.0)
     steps[beyond] = _boundaries(_Nodes.of(g.ravel()[beyond], z.ravel()[beyond], s.ravel()[beyond]), rtol)
@@ -90,9 +87,9 @@ def _next_errors(nodes: _Nodes, errors: Array) -> Array:
     """Error at the next stick after a breakaway with this one, (n,); infinite where the response diverges.
 
     It diverges once friction cannot stop the growing mode, or if the growth of the mode increases over two
-    slips; if its decrease increases over two slips, the error is 0.  Reason: near a cycle of reversals the
-    changes of its size are a mu^n + b nu^n with mu > 1 > |nu|, nu from the real mode; two of the same sign,
-    the later one greater, have the sign of a.
+    slips; if its decrease increases over two slips, or its size stays the same, the error is 0.  Reason: near
+    a cycle of reversals the changes of its size are a mu^n + b nu^n with mu > 1 > |nu|, nu from the real mode;
+    two of the same sign, the later one greater, have the sign of a.
     """
     found = np.full(errors.size, math.inf)
     index = np.arange(errors.size)
@@ -104,7 +101,7 @@ def _next_errors(nodes: _Nodes, errors: Array) -> Array:
         lost = (end.pair > nodes.runaway) & (np.abs(end.real) < 0.1 * end.pair)
         lost |= (rise_before > 0.0) & (rise >= rise_before)
         sticks = ~lost & (end.acceleration + 1.0 >= -nodes.stiction)
-        falls = ~lost & ~sticks & (rise_before < 0.0) & (rise <= rise_before)
+        falls = ~lost & ~sticks & (rise_before <= 0.0) & (rise <= rise_before)
         found[index[sticks]] = np.abs(end.error[sticks])
         found[index[falls]] = 0.0
         on = np.flatnonzero(~(lost | sticks | falls))

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_theory.arguments import Array, above_zero, finite, zero_or_more
+from wam_theory.arguments import Array, above_zero, finite, quotient, zero_or_more
 from wam_theory.linear_loop import damping_ratio, series_stiffness
 
 
@@ -34,13 +34,10 @@ def breakaway_delay(
     """
     g, ktr = above_zero(gain=gain, transmission_stiffness=transmission_stiffness)
     (fs,) = zero_or_more(static_friction=static_friction)
-    e, f = np.asarray(error, dtype=float), np.asarray(spring_force, dtype=float)
+    e, f = finite(error=error, spring_force=spring_force)
     if not np.all(np.abs(f) <= fs * (1.0 + 1e-12)):
         raise ValueError(f"spring_force is {spring_force!r}; a stuck node holds at most {static_friction!r}")
-    shape = np.broadcast_shapes(g.shape, ktr.shape, fs.shape, e.shape, f.shape)
-    distance = np.broadcast_to(fs - np.sign(e) * f, shape)
-    speed = np.broadcast_to(g * ktr * np.abs(e), shape)
-    return np.divide(distance, speed, out=np.full(shape, math.inf), where=speed > 0.0)
+    return quotient(fs - np.sign(e) * f, g * ktr * np.abs(e))
 
 
 def stuck_motor_speed(gain: ArrayLike, error: ArrayLike) -> Array:
@@ -141,9 +138,7 @@ def stiction_cycle_number(
     """
     zeta = damping_ratio(inertia, damping, transmission_stiffness, contact_stiffness)
     number = inertia_number(gain, inertia, transmission_stiffness, contact_stiffness)
-    below = np.sqrt(np.maximum(1.0 - zeta * zeta, 0.0))
-    shape = np.broadcast_shapes(zeta.shape, number.shape)
-    return np.divide(number, below, out=np.full(shape, math.inf), where=below > 0.0)
+    return quotient(number, np.sqrt(np.maximum(1.0 - zeta * zeta, 0.0)))
 
 
 def slip_overshoot(zeta: ArrayLike) -> Array:
@@ -156,9 +151,7 @@ def slip_overshoot(zeta: ArrayLike) -> Array:
     zeta : (5.12), zero or more.
     """
     (z,) = zero_or_more(zeta=zeta)
-    below = np.sqrt(np.maximum(1.0 - z * z, 0.0))
-    exponent = np.divide(-math.pi * z, below, out=np.full(z.shape, -math.inf), where=below > 0.0)
-    return 1.0 + np.exp(exponent)
+    return 1.0 + np.exp(quotient(-math.pi * z, np.sqrt(np.maximum(1.0 - z * z, 0.0)), -math.inf))
 
 
 def stiction_cycle_force(
@@ -206,9 +199,7 @@ def stiction_cycle_period(
     )
     jump = slip_overshoot(zeta) * friction_drop(static_friction, dynamic_friction)
     (fs,) = zero_or_more(static_friction=static_friction)
-    shape = np.broadcast_shapes(fs.shape, jump.shape)
-    waits = np.divide(2.0 * fs, jump, out=np.full(shape, math.inf), where=jump > 0.0)
-    return 4.0 / (g * ktr) * (ktr + kc) / kc * (waits - 1.0)
+    return 4.0 / (g * ktr) * (ktr + kc) / kc * (quotient(2.0 * fs, jump) - 1.0)
 
 
 def staircase_number(
@@ -238,9 +229,7 @@ def staircase_number(
     zeta = damping_ratio(inertia, damping, transmission_stiffness, contact_stiffness)
     ks = np.asarray(transmission_stiffness, dtype=float) + np.asarray(contact_stiffness, dtype=float)
     moved = math.pi * g * np.abs(e) * np.sqrt(ks * np.asarray(inertia, dtype=float))
-    slipped = df * np.sqrt(np.maximum(1.0 - zeta * zeta, 0.0))
-    shape = np.broadcast_shapes(moved.shape, slipped.shape)
-    return np.divide(moved, slipped, out=np.full(shape, math.inf), where=slipped > 0.0)
+    return quotient(moved, df * np.sqrt(np.maximum(1.0 - zeta * zeta, 0.0)))
 
 
 def play(desired: ArrayLike, friction: ArrayLike) -> Array:

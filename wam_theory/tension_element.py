@@ -137,7 +137,8 @@ def loss_by_sticking_point(
 
     V (T2 - T1)/EA times T - (T1 + T2)/2 - T^2/(2 EA), T the tension of the other end.  The second is
     negative for every load, contrary to the second law: the cable sticks at its entry.  The last term
-    is an artefact of (6.5), second order; without it the first is (6.11).
+    is an artefact of (6.5), second order; without it the first is (6.11), with it negative for T2 - T1
+    below T2^2/EA.
 
     Parameters
     ----------

@@ -19,6 +19,8 @@ def test_resonances_are_the_eigenvalues_of_the_two_masses() -> None:
         jm, jl, ktr, kc, n = np.array([4e-5, 0.4, 10.0, 1e3, 15.0]) * 10.0 ** rng.uniform(-1, 1, 5)
         lower, upper = force_resonances(jm, jl, ktr, kc, n)
         np.testing.assert_allclose([lower, upper], eigenvalues(jm, jl, ktr, kc, n), rtol=1e-6)
+        at_corner = force_resonances(jm, jl, ktr, ktr * jl / jm, 1e-9)  # of (4.7), where both are equal
+        np.testing.assert_allclose(at_corner, math.sqrt(ktr / jm), rtol=1e-8)
 
 
 def test_soft_contact_keeps_its_digits() -> None:

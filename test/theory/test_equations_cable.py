@@ -21,16 +21,10 @@ def test_stage_is_twice_as_stiff_for_twice_the_circuits_and_a_quarter_for_twice_
 
 @pytest.mark.parametrize(
     ("distance", "expected"),
-    [
-        (2.0, 98_000.0),  # all of the line runs fast: N^2 EA/L
-        (0.0, 7_000.0),  # all of it slow, N times the section: N EA/L
-        (1.0, 1 / (1 / 196_000 + 1 / 14_000)),  # 1 m of each, in series
-    ],
+    [(2.0, 98_000.0), (0.0, 7_000.0), (1.0, 1 / (1 / 196_000 + 1 / 14_000))],
 )
-def test_reducer_at_the_joint_makes_the_line_n_times_stiffer_than_at_the_motor(
-    distance: float, expected: float
-) -> None:
-    """(4.1) for EA = 1000 N, L = 2 m, N = 14."""
+def test_reducer_at_the_joint_makes_the_line_n_times_stiffer(distance: float, expected: float) -> None:
+    """(4.1) for EA = 1000 N, L = 2 m, N = 14: all fast, N^2 EA/L; all slow, N EA/L; 1 m of each."""
     assert cable.stiffness_with_reducer(1000, 2.0, 14, distance) == pytest.approx(expected, rel=EXACT)
 
 

@@ -59,6 +59,7 @@ def test_friction_makes_the_motor_cycle_with_a_period_that_stays() -> None:
     assert force[-1] == pytest.approx(4.5, abs=0.01)
 
 
-def test_force_on_a_step_is_at_rest() -> None:
+def test_force_on_a_step_is_at_rest_and_beyond_routh_without_bound() -> None:
+    assert hunting(STEP, [0.5, 1.0], 4.5) == pytest.approx([2.0 / math.pi, math.inf])
     with pytest.raises(ValueError, match="multiple of step"):
         quantised_cycle_period(0.01, KTR, 0.3, 4.0, STEP)

@@ -90,6 +90,7 @@ def test_last_term_of_6_10_takes_the_loss_away_from_the_exact_one() -> None:
     without = float(te.pulley_loss(stage.shaft_out, tight - loose, EA))
     assert without == pytest.approx(stage.driven_loss, rel=1e-10)
     assert with_term == pytest.approx(stage.driven_loss * (1.0 - tight / EA), rel=1e-10)
+    assert te.loss_by_sticking_point(1.0, 79.4, 80.0, 9500.0, True) < 0.0  # 80^2/9500 is 0.67
 
 
 def test_numbers_of_6_6_and_6_7_are_terms_of_the_balance_over_the_loss() -> None:

@@ -46,6 +46,8 @@ def test_domain_one_has_no_largest_step_and_domain_three_none_at_all() -> None:
     steps = largest_stable_steps([[0.4, 0.97, 1.0], [2.19, 2.5, 40.0]], 0.25)
     np.testing.assert_array_equal(steps, [[math.inf] * 3, [0.0] * 3])
     assert largest_stable_steps(2.18, 0.25) > 0.7
+    near, nearer = largest_stable_steps([1.0 + 1e-6, 1.0 + 1e-9], 0.25)  # in proportion to 1/(gamma - 1), (5.16)
+    assert nearer / near == pytest.approx(1e3, rel=1e-3)
 
 
 def test_boundary_ends_in_point_b() -> None:
