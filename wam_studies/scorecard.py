@@ -96,14 +96,16 @@ def normal_directions(body: RigidBody, q: tuple[float, ...]) -> Array:
 
 
 def steady_force(arm: Arm) -> float:
-    """Force, N, at the tip and at the elbow within the continuous torques, in any direction and pose."""
+    """Force, N, at the tip and at the elbow within the continuous torques, in any direction, and a pose of a grid.
+
+    The stretched pose of (A.3), which has the longest lever, is added; 0 if gravity alone takes more in one.
+    """
     body, torque_share = RigidBody(arm), TransmissionMap.of(arm).joint_from_motor.T
     limits = np.array(arm.motors.continuous_torque)
     ranges = [np.linspace(low, high, POSES) for low, high in zip(arm.joints.lower, arm.joints.upper, strict=True)]
     least = math.inf
-    for angles in product(*ranges[1:]):
-        q = (0.0, *angles)
-        left = limits - np.abs(torque_share @ body.gravity_torque(q))
+    for q in (printed("pose with both links stretched out horizontally"), *product((0.0,), *ranges[1:])):
+        left = np.maximum(limits - np.abs(torque_share @ body.gravity_torque(q)), 0.0)
         for jacobian in (body.tool_jacobian(q), body.point_jacobian(q, arm.covers.names[0], arm.covers.end[:3])):
             needed = np.linalg.norm(torque_share @ jacobian.T, axis=1)
             least = min(least, float(np.min(left / np.maximum(needed, 1e-12))))

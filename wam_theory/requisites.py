@@ -7,7 +7,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.arguments import Array, above_zero, quotient, zero_or_more
 from wam_theory.resonance import force_resonances, hard_contact_bandwidth
 
 TOLERANCE: Final = 0.01  # of a required value that is printed with two digits
@@ -209,8 +209,8 @@ def _impact(m: Measures) -> float:
 def _dynamic_range(m: Measures) -> list[Requisite]:
     name = "dynamic range"
     joints = [
-        _row(name, f"peak torque / friction, joint {i}", 1.0 / share, "", "at least", 1.0 / required, "7.2.2")
-        for i, (share, required) in enumerate(zip(m.friction_share, m.friction_required, strict=True), 1)
+        _row(name, f"peak torque / friction, joint {i}", float(ratio), "", "at least", 1.0 / required, "7.2.2")
+        for i, (ratio, required) in enumerate(zip(quotient(1.0, m.friction_share), m.friction_required, strict=True), 1)
     ]
     return [
         _row(
@@ -225,14 +225,14 @@ def _dynamic_range(m: Measures) -> list[Requisite]:
         _row(
             name,
             "steady force / force masked by friction, open loop",
-            m.steady_force / m.least_force,
+            float(quotient(m.steady_force, m.least_force)),
             "",
             source="3.2.1",
         ),
         _row(
             name,
             "steady force / largest stiction cycle (5.8), force feedback, friction of the joints only",
-            m.steady_force / m.cycle_force if m.cycle_force else math.inf,
+            float(quotient(m.steady_force, m.cycle_force)),
             "",
             source="3.2.1",
         ),
