@@ -13,7 +13,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import PARAMETERS, shaped_like
 from wam_description.interface import declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build_part, dotted, fields, require
+from wam_description.parameters import ParameterError, build_part, dotted, fields, meant, require
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
@@ -97,7 +97,8 @@ class RecordedParameters(NamedTuple):
             node, colon, name = key.rpartition(":")
             owners = [own for own, flat in self.nodes.items() if name in flat and (own == node or not colon)]
             who = f"node '{node}' has no" if colon else "no node has"
-            reason = f"{who} parameter '{name}' in {self.source}; write [node:]parameter=value"
+            known = [f"{own}{colon}{one}" if colon else one for own, flat in self.nodes.items() for one in flat]
+            reason = f"{who} parameter '{name}' in {self.source}; {meant(key, known)}write [node:]parameter=value"
             require(bool(owners), f"--set {key}: {reason}")
             settings |= {f"{own}:{name}": shaped_like(self.nodes[own][name], value) for own in owners}
         changed = self.with_values(settings)

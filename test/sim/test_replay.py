@@ -255,6 +255,7 @@ def test_a_parameter_that_cannot_be_set_is_refused_as_one_of_the_option(bag: Pat
     for name, value, said in (
         ("force_loop:gain", 1.0, "--set force_loop:gain: node 'force_loop' has no parameter 'gain'"),
         ("nonsense", 1.0, "--set nonsense: no node has parameter"),
+        ("force_lop:force_gain", 1.0, "no parameter 'force_gain' in .*; did you mean 'force_loop:force_gain'"),
         ("force_loop:force_gain", -1.0, "--set: parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
         ("timing.period", "fast", "--set: parameter 'timing.period' is 'fast'"),
         ("timing.period", 0.002, "timing.period is 0.002 s; in a replay it must be 0.001 s, as recorded"),
@@ -264,15 +265,13 @@ def test_a_parameter_that_cannot_be_set_is_refused_as_one_of_the_option(bag: Pat
 
 
 def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(SystemExit, match=r"^0$"):
         cli.main(["replay", str(bag), "transform"])
-    assert ended.value.code == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "joint_states: 101 messages, the same bit for bit"
     assert not any("nothing changed" in line for line in lines)
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(SystemExit, match=r"^0$"):
         cli.main(["replay", str(bag), "gravity", "--set", "force_loop:force_gain=[0.01]"])
-    assert ended.value.code == 0
     assert "nothing changed with force_loop:force_gain=[0.01]: " in capsys.readouterr().out.splitlines()[-1]
     with pytest.raises(SystemExit) as ended:
         cli.main(["replay", str(bag), "gravity", "--config", "wam"])
