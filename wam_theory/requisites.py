@@ -38,9 +38,9 @@ def secure_angle(friction_coefficient: ArrayLike) -> Array:
 
     Parameters
     ----------
-    friction_coefficient : mu, above zero.
+    friction_coefficient : mu, zero or more.
     """
-    (mu,) = above_zero(friction_coefficient=friction_coefficient)
+    (mu,) = zero_or_more(friction_coefficient=friction_coefficient)
     return 2.0 * np.arctan(mu)
 
 
@@ -52,12 +52,13 @@ def useful_length(aspect_ratio: ArrayLike, angle: ArrayLike) -> Array:
     Parameters
     ----------
     aspect_ratio : L/W, above zero.
-    angle : theta between the links, rad, above zero, at most pi; `secure_angle` for a grasp without slip.
+    angle : theta between the links, rad, zero to pi; `secure_angle` for a grasp without slip.
     """
-    ratio, theta = above_zero(aspect_ratio=aspect_ratio, angle=angle)
+    (ratio,) = above_zero(aspect_ratio=aspect_ratio)
+    (theta,) = zero_or_more(angle=angle)
     if not np.all(theta <= math.pi):
         raise ValueError(f"angle is {angle!r} rad; it must not be above pi")
-    return np.maximum(1.0 - 0.5 / (ratio * np.tan(theta / 2.0)), 0.0)
+    return np.maximum(1.0 - quotient(0.5, ratio * np.tan(theta / 2.0)), 0.0)
 
 
 def largest_cylinder(aspect_ratio: ArrayLike, friction_coefficient: ArrayLike) -> Array:
@@ -68,9 +69,10 @@ def largest_cylinder(aspect_ratio: ArrayLike, friction_coefficient: ArrayLike) -
     Parameters
     ----------
     aspect_ratio : L/W, above zero.
-    friction_coefficient : mu, above zero.
+    friction_coefficient : mu, zero or more.
     """
-    ratio, mu = above_zero(aspect_ratio=aspect_ratio, friction_coefficient=friction_coefficient)
+    (ratio,) = above_zero(aspect_ratio=aspect_ratio)
+    (mu,) = zero_or_more(friction_coefficient=friction_coefficient)
     return np.maximum(2.0 * mu - 1.0 / ratio, 0.0)
 
 

@@ -109,9 +109,7 @@ def test_order_of_the_regimes_holds_above_zeta_0_1372_alone() -> None:
     assert regimes.gamma_3(1e4) == pytest.approx(1.0 + 0.5e-4 / math.pi, rel=1e-7)
     zeta = np.array([0.02, 0.05, 0.1372, 0.25, 0.6, 0.86, 0.9, 1.5, 3.0])
     a, b, third = regimes.gamma_a(zeta), regimes.gamma_b(zeta), regimes.gamma_3(zeta)
-    assert np.all(a <= b)
-    assert np.all(b < third)
-    assert np.all(third > 1.0)
+    assert np.all((a <= b) & (b < third) & (third > 1.0))
     assert np.array_equal(a == b, zeta > math.sqrt(0.75))
 
 

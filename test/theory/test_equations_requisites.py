@@ -93,3 +93,4 @@ def test_useful_length_and_largest_cylinder_are_those_of_two_bars(aspect: float,
 def test_stubby_links_grasp_nothing_and_slender_ones_nearly_all() -> None:
     assert useful_length([0.5, 1e6], 0.3) == pytest.approx([0.0, 1.0], abs=1e-5)
     assert largest_cylinder([1.0, 1e6], 0.3) == pytest.approx([0.0, 0.6], abs=1e-5)
+    assert useful_length(1e6, secure_angle(0.0)) == largest_cylinder(1e6, 0.0) == 0.0  # nothing holds without friction
