@@ -298,8 +298,8 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
         )
     ]
     if lost:
-        text = f"no state of the arm for {snapshot.silent:.0f} s: the stack has ended, or waits for a node"
-        lines.append(paragraph(text, DOTS[Level.ERROR]))
+        text = f"no state of the arm for {snapshot.silent:.0f} s: the stack has ended, waits for a node, or has "
+        lines.append(paragraph(f"{text}another arm; then start 'wam live' again", DOTS[Level.ERROR]))
     if driver.fault:
         lines.append(paragraph(html.escape(driver.fault), DOTS[Level.ERROR]))
     if pressing:

@@ -257,7 +257,7 @@ def test_an_arm_that_is_not_heard_of_is_not_shown_as_enabled() -> None:
     driver = NodeStatus(Level.OK, "enabled", node="driver", mode="enabled")
     shown = lambda silent, status=driver: status_page(Snapshot(silent=silent, statuses={"driver": status}))  # noqa: E731
     assert "no state" not in shown(0.5)
-    assert "no state of the arm for 5 s" in shown(5.0)
+    assert "no state of the arm for 5 s: the stack has ended, waits for a node, or has another arm" in shown(5.0)
     assert dot(Level.OK) in shown(0.5)
     assert dot(Level.OK) not in shown(5.0)
     paused = shown(5.0, driver._replace(facts={PAUSED: "paused"}))
