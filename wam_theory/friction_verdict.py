@@ -48,7 +48,7 @@ class FrictionVerdict(NamedTuple):
         not followed to their end; `stable_error` where all were.
     cycle : stiction limit cycle of small errors.
     saturated_cycle : peak to peak of the largest limit cycle of F_c found in domain I with the saturation of the loop,
-        N or N m: near the margin of a delayed loop friction keeps up one above the saturation.
+        N or N m: that of stiction, or, with a `stable_error` of 0, one that friction keeps up in a delayed loop.
     """
 
     domain: Domain

@@ -41,10 +41,12 @@ class LoopDesign(NamedTuple):
         """For people, with what to do where the loop is not safe."""
         node, verdict, cycle = self.node, self.verdict, self.verdict.cycle
         part, ratio = self.loop.gain / verdict.margin, node.transmission_stiffness / node.contact_stiffness
-        stiction = "none"
+        stiction, followed = "none", f"{verdict.saturated_cycle:.3g}"
         if cycle.peak_to_peak:
-            stiction = f"{cycle.peak_to_peak:.4g} every {cycle.period:.3g} s; a deadband of "
-            stiction += f"{cycle.deadband:.3g} removes it"
+            stiction = f"{cycle.peak_to_peak:.4g} every {cycle.period:.3g} s by (5.8), (5.9)"
+            if verdict.saturated_cycle and verdict.stable_error:
+                stiction += f", {followed} by simulation"
+            stiction += f"; a deadband of {cycle.deadband:.3g} removes it"
         undecided = verdict.undecided_error
         lines = [
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
@@ -60,8 +62,8 @@ class LoopDesign(NamedTuple):
                 f"undecided: up to {undecided:.4g} all responses that were followed to their end come to rest, but "
                 f"some were not followed to their end ({DESIGN.patient_events} events)"
             )
-        if verdict.saturated_cycle:
-            lines.append(f"a large step may end in another limit cycle, peak to peak: {verdict.saturated_cycle:.3g}")
+        if verdict.saturated_cycle and not verdict.stable_error:
+            lines.append(f"a large step may end in another limit cycle, peak to peak: {followed}")
         lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the largest"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)

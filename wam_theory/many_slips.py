@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wam_theory.arguments import Array
+
 _TURN = 2.0 * math.pi
 
 

@@ -10,12 +10,11 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wam_theory.arguments import Array
 from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
-
-Array = NDArray[np.float64]
 
 
 def locked_rotors(

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wam_theory.arguments import Array
+
 TERMS = 15  # of the Taylor series, of a matrix whose norm is at most 1/16: 1/(16^16 16!) is left out
 
 

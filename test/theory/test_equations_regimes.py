@@ -75,9 +75,8 @@ def test_slips_never_stop_below_gamma_a_and_do_above(zeta: float) -> None:
     assert slip_by_matrix(0.97 * bound, zeta) is None
     node = FrictionNode(1.0, 4.0 * zeta, 2.0, 2.0, 1.0, 1.0)
     for factor, stops in ((0.999, False), (1.02, True)):
-        kinds = [
-            e.kind for e in simulate(node, IntegralLoop(factor * bound * 4.0 * zeta), 1.0, 1e6, max_events=5).events
-        ]
+        loop = IntegralLoop(factor * bound * 4.0 * zeta)
+        kinds = [event.kind for event in simulate(node, loop, 1.0, 1e6, max_events=5).events]
         assert (Kind.STICK in kinds) is stops
 
 
@@ -175,9 +174,6 @@ def test_actuator_power_is_its_work_over_the_time_of_the_exact_half_cycle() -> N
     breaks = [e for e in events if e.kind is Kind.SLIP][-2:]
     error = abs(1.0 - breaks[1].contact_force)
     time = breaks[1].time - breaks[0].time
-    assert regimes.actuator_cycle_power(gamma, error, friction) * time == pytest.approx(
-        float(regimes.actuator_cycle_work(friction, 2.0)), rel=1e-3
-    )
-    # the spring's energy at breakaway, which its unloading by the motor gives away
-    stretch = friction / 2.0
-    assert regimes.actuator_cycle_work(friction, 2.0) == pytest.approx(0.5 * 2.0 * stretch**2)
+    work = float(regimes.actuator_cycle_work(friction, 2.0))
+    assert regimes.actuator_cycle_power(gamma, error, friction) * time == pytest.approx(work, rel=1e-3)
+    assert work == pytest.approx(0.5 * 2.0 * (friction / 2.0) ** 2)  # of the spring at breakaway, lost as it unloads
