@@ -46,6 +46,7 @@ def errors(q: Sequence[float], force: float, sd: float = 0.01, **more: float) ->
         ("place", {}, {"sd": 0.1}),
         ("resting", {}, {"resting": -9.0}),
         ("moving_surface", {"surface_speed": 0.015}, {}),
+        ("moving_surface", {"surface_speed": 9.0}, {}),  # no force law follows it
         ("moving_surface", {"slide_speed": 1.0}, {}),
         ("slow_arm", {"impact": 1e-6}, {}),
         ("slow_arm", {"settling_time": 1e-3}, {}),

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import is_too_slow, yielding
+from wam_control.force.limits import approach_speed, yielding
 from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import Array
 
@@ -103,16 +103,17 @@ def predicted(
     if sensed is None or sensed.force_sd == math.inf:
         return Errors(torques=math.inf)
     limits, soft = own.limits, yielding(sensed, own)
-    pace = max(own.force_gain) * sensed.speed_fraction
-    settling = FORCE.settled * soft / pace if pace else math.inf
+    pace = max(max(own.force_gain) * sensed.speed_fraction, FORCE.negligible)
     slope = FORCE.friction_turn * FORCE.surface_slope * limits.slide_speed / soft
+    free, touching = (sensed.speed_fraction * approach_speed(axis, is_touching, own) for is_touching in (False, True))
+    is_slow = FORCE.settled * soft / pace > limits.settling_time or free < FORCE.creep / limits.settling_time
     return Errors(
         torques=sensed.error(torque_sd),
         friction=sensed.friction_sd,
         place=sensed.place_sd,
         resting=abs(resting),
-        moving_surface=(limits.surface_speed / pace if limits.surface_speed else 0.0) + slope,
-        slow_arm=math.inf if is_too_slow(axis, own) or settling > limits.settling_time else 0.0,
+        moving_surface=math.inf if touching < limits.surface_speed else limits.surface_speed / pace + slope,
+        slow_arm=math.inf if is_slow else 0.0,
         shaking_arm=limits.tolerance / limits.shake_force * shaking,
     )
 

@@ -88,15 +88,6 @@ def servo_yielding(axis: CommandedAxis, servo_stiffness: Array, own: ForceLoopPa
     return square * square / max(float(axis.along.dot(servo_stiffness).dot(axis.along)), FORCE.negligible)
 
 
-def is_too_slow(axis: CommandedAxis, own: ForceLoopParameters) -> bool:
-    """Whether the arm is too slow to reach a surface at all, or to follow one that moves."""
-    sensed = axis.sensed
-    if sensed is None or not sensed.speed_fraction:
-        return False  # without a lever the force is not measured, either
-    free, touching = (sensed.speed_fraction * approach_speed(axis, is_touching, own) for is_touching in (False, True))
-    return free < FORCE.creep / own.limits.settling_time or touching < own.limits.surface_speed
-
-
 def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> float:
     """Error of a force, N, that is left alone: a smaller one than friction lets the arm correct."""
     return min(FORCE.kept * own.limits.tolerance * abs(desired), FORCE.finest_motion / yielding(sensed, own))
