@@ -530,7 +530,7 @@ def test_tare_takes_the_steady_torques_as_zero_again_and_again(feedback: str) ->
 
     def at(newtons: float, commanded: float | None) -> ForceOutput:
         given = {"contact": TOUCH, "external": (-newtons * lever(POSE)).tolist()}
-        return [ask(loop, World(force=newtons), commanded, **given) for _ in range(1 if commanded else 400)][-1]
+        return [ask(loop, World(force=newtons), commanded, **given) for _ in range(400)][-1]
 
     at(3.0, None)
     assert loop.tare() == ""

@@ -16,15 +16,15 @@ from wam_description.rigid_body import Array, RigidBody
 
 
 class LowPass:
-    """First-order low pass of several values that starts at its first input.
+    """First-order low pass of several values, from its first input on if it is given none.
 
     Attributes
     ----------
     value : filtered values (n,); empty before the first input.
     """
 
-    def __init__(self) -> None:
-        self.value = list[float]()
+    def __init__(self, value: Sequence[float] = ()) -> None:
+        self.value = list(value)
 
     def step(self, value: Sequence[float], time_constant: float, dt: float) -> list[float]:
         """Filtered values; `time_constant` and `dt` in s."""
@@ -66,7 +66,7 @@ class ForceMeasurement:
         self._body = body
         self._none = np.zeros(len(body.arm.joints.names))
         self._tare = self._zero = Zero(0.0, self._none)
-        self.free = self._external = self._none
+        self.free = self._none
         self._q: Sequence[float] = ()
         self._torque_sd = self._none
         self._velocity = list[float]()
@@ -74,9 +74,9 @@ class ForceMeasurement:
         self.rested, self.speed = 0.0, math.inf
         self.restart()
 
-    def restart(self) -> None:
-        """Forget the filtered torques."""
-        self._filter = LowPass()
+    def restart(self, torques: Sequence[float] = ()) -> None:
+        """Forget the filtered torques, or go on from others (n,), N m."""
+        self._filter = LowPass(torques)
         self.torques = WorldTorques(self._none, self._none, None, self._none)
 
     def step(self, own: ForceLoopParameters, given: ForceInput, is_touched: bool) -> None:
@@ -94,9 +94,8 @@ class ForceMeasurement:
         self.speed = max(map(abs, self._speed.step(given.joints.velocity, FORCE.steady_time, dt)))
         self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
         self._steady.step(torque.tolist(), FORCE.steady_time, dt)
-        self._external = torque - self._zeros
         is_first = not self._filter.value
-        counted = self._external if is_touched or not own.is_estimated else self._none
+        counted = torque - self._zeros if is_touched or not own.is_estimated else self._none
         now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
         velocity = [0.0] * len(self._none) if given.sensors is None else given.sensors.velocity
         change = [(new - old) / dt for new, old in zip(velocity, self._velocity or velocity, strict=True)]
@@ -132,7 +131,7 @@ class ForceMeasurement:
         """Take the steady external torques as zero."""
         self._tare = self._taken(np.array(self._steady.value) - self._zero.at(self._body, self._q))
         self.free = self._zeros
-        self.restart()
+        self.restart(self.resting.tolist())
 
     @property
     def resting(self) -> Array:
@@ -145,7 +144,7 @@ class ForceMeasurement:
         if float(np.abs(found).max()) <= limit:
             self._zero = self._taken(found)
             self.free = self._zeros
-            self.restart()
+            self.restart(self.resting.tolist())
 
     def payload(self, torques: Array, torque_sd: float) -> float:
         """Mass at the tool, kg, that explains torques of the world on the joints; 0 where none does.

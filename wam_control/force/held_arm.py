@@ -11,7 +11,7 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import certain_size, largest_lever, lever_of, likeliest_link
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
-from wam_description.event import Code, Event, Value, warning
+from wam_description.event import Code, Event, warning
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import Contact
 from wam_description.small_matrices import length
@@ -88,8 +88,7 @@ class PushedArm:
         if hardest > allowed:
             self._since = 0.0
             if not is_bouncing or hardest > own.limits.contact_force:
-                values: dict[str, Value] = {"force": hardest, "allowed": bound[0], "limit": bound[1]}
-                self.event = warning(Code.PUSHED, "pushed", **values)
+                self.event = warning(Code.PUSHED, "pushed", force=hardest, allowed=bound[0], limit=bound[1])
         elif self._since > FORCE.lasting:
             self.event = None
         if not certain:
