@@ -111,10 +111,10 @@ SENTENCES: Final = {  # by cause
     "(limits.free_travel); the arm holds its position; end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
-    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:z.3g} {unit} have been measured for "
+    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:z.2f} {unit} have been measured for "
     "{time:b} s; {reach}",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
-    "{measured:z.3g} {unit} are measured, {desired:.3g} {unit} are commanded; perhaps the surface moves, something "
+    "{measured:z.2f} {unit} are measured, {desired:.3g} {unit} are commanded; perhaps the surface moves, something "
     "else pushes, or the friction of the surface has changed its direction",
     "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but it has been at {measured:.4g} {unit} for {time:b} s; "
     "allowed error: {allowed:.2g} {unit}; perhaps something is in the way, a joint is at its end, or the arm cannot "

@@ -139,6 +139,8 @@ def test_torques_that_change_after_the_force_has_settled_are_reported_with_as_mu
     assert pressed.last(0.08, torques=aside - FORCE * PRESS) == []
     assert pressed.last(0.1, torques=aside - FORCE * PRESS) == changed
     assert pressed.last(0.2) == []
+    pressed.axis = AXIS._replace(in_frame=-AXIS.in_frame)  # another direction is commanded
+    assert pressed.last(0.2, torques=aside - FORCE * PRESS) == []
 
 
 def test_torques_that_change_with_the_pose_alone_are_those_of_the_force() -> None:

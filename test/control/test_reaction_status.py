@@ -49,7 +49,7 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
         (warning(Code.NOT_REACHED, "force_off", measured=-0.2, **OFF), "for 2 s; nothing is touched"),
         (
             warning(Code.NOT_REACHED, "force_off", measured=-5.6, **OFF),
-            "-5.6 N have been measured for 2 s; the arm is p",
+            "-5.60 N have been measured for 2 s; the arm is p",
         ),
         (warning(Code.MODEL_OFF, "model_off", part="friction of motor1"), "if it lasts, run 'wam identify'"),
         (warning(Code.MODEL_OFF, "model_off", part="payload"), "(arm.payload); if the tool carries none, run"),

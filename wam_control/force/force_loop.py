@@ -446,8 +446,8 @@ class ForceLoop:
             end = low if unlimited[i] < 0.0 else high
             near = own.limits.joint_margin + FORCE.push_back / max(own.limits.joint_gain, FORCE.push_back)
             if abs(velocity[i]) < FORCE.stopped * abs(unlimited[i]) and abs(at - end) < near and own.limits.joint_gain:
-                values = {"angle": at, "end": end, "margin": own.limits.joint_margin}
-                found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
+                name, margin = joints.names[i], own.limits.joint_margin
+                found.append(warning(Code.AT_LIMIT, "joint_end", joint=name, angle=at, end=end, margin=margin))
         return found
 
     def _watch_motions(self, found: Sequence[Event], given: ForceInput) -> list[Event]:

@@ -21,6 +21,7 @@ from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.event import Code, Event, Value, holding, warning
 from wam_description.rigid_body import Array
+from wam_description.small_matrices import length
 
 
 class Lasting:
@@ -180,7 +181,8 @@ class ForceWatch:
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
         # of the largest doubt: 1 while it is refused, then somewhat more, and any once it is decided
         self._slack, self._has_settled = 1.0, False
-        self._desired, self._travel = math.nan, 0.0
+        self._commanded: Array | float = math.nan
+        self._travel = 0.0
         self._pattern: Array | None = None  # m, torques per force that it did not explain as it settled
 
     def step(self, axis: CommandedAxis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
@@ -196,8 +198,10 @@ class ForceWatch:
         """
         known, desired, limits = seen.known, axis.desired, own.limits
         error = desired - known.force
-        if not abs(desired - self._desired) <= FORCE.faint_swing * known.tolerance:  # the force turns with its command
-            self._has_settled, self._pattern, self._desired = False, None, desired
+        commanded = desired * (axis.along if axis.is_joint else axis.in_frame)
+        # the force turns with its command
+        if not length(commanded - self._commanded) <= FORCE.faint_swing * known.tolerance:
+            self._has_settled, self._pattern, self._commanded = False, None, commanded
             self._changed = Lasting()
             self.oscillation.rest()
         events = self._decide(axis, known, error, own, dt)
@@ -207,8 +211,8 @@ class ForceWatch:
         self.ended = self.ended or self._contradicted(axis, seen, dt) or self._travelled(seen, is_reached, own)
         if self.ended:
             return [self.ended]
-        lasting = limits.settling_time
-        soon, late = FORCE.quarter * lasting, lasting
+        late = limits.settling_time
+        soon = FORCE.quarter * late
         after, back = (soon, late) if self._has_settled else (late, soon)
         if self._off.step(not is_reached, after, back, dt):
             event = warning(
@@ -279,8 +283,8 @@ class ForceWatch:
             self._travel = 0.0 if seen.is_led else min(self._travel, 0.0)
         if abs(self._travel) <= own.limits.free_travel:
             return None
-        values = {"way": self._travel, "allowed": own.limits.free_travel, "has_settled": float(self._has_settled)}
-        return holding(Code.AT_LIMIT, "free_travel", **values)
+        way, allowed = self._travel, own.limits.free_travel
+        return holding(Code.AT_LIMIT, "free_travel", way=way, allowed=allowed, has_settled=float(self._has_settled))
 
     def _unexplained(
         self, axis: CommandedAxis, known: Belief, torques: Array, own: ForceLoopParameters, dt: float
