@@ -85,7 +85,7 @@ class IntegralLoop:
         if not self.error_limit > self.deadband:
             raise ValueError(f"error_limit is {self.error_limit}; it must be above the deadband, {self.deadband}")
         require("sample_period", self.sample_period, at_least=0.0)
-        if self.delay_samples < 0 or int(self.delay_samples) != self.delay_samples:
+        if not self.delay_samples >= 0 or self.delay_samples % 1:
             raise ValueError(f"delay_samples is {self.delay_samples}; it must be a whole number, zero or more")
         if self.delay_samples and not self.sample_period:
             raise ValueError(f"delay_samples is {self.delay_samples}; without a sample_period it must be zero")

@@ -236,7 +236,7 @@ def sampled_margin(
             sample_period=sample_period,
         )
     )
-    if delay_samples < 0 or int(delay_samples) != delay_samples:
+    if not delay_samples >= 0 or delay_samples % 1:
         raise ValueError(f"delay_samples is {delay_samples}; it must be a whole number, zero or more")
     fast = _fast_margin(j, b, ktr, kc, period, int(delay_samples))
     if fast.frequency * period < SEARCH.fast and fast.frequency * period * (delay_samples + 0.5) < SEARCH.short_delay:

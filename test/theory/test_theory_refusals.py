@@ -9,6 +9,7 @@ from wam_theory import cable, linear_loop, requisites, stiction
 from wam_theory import tension_element as element
 from wam_theory.arguments import above_zero, finite, zero_or_more
 from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
+from wam_theory.friction_model import IntegralLoop
 
 
 @pytest.mark.parametrize(
@@ -38,6 +39,8 @@ def test_an_argument_out_of_range_is_refused_by_its_name(
         (lambda: element.speed_ratio(2.0, 1.0, 9.0), "tight is 1.0 N; it must be at least loose"),
         (lambda: element.output_power(1.0, 9.0, 9.0), "difference is 9.0 N; it must be below ea"),
         (lambda: linear_loop.sampled_margin(1.0, 1.0, 1.0, 1.0, 0.1, -1), "delay_samples is -1"),
+        (lambda: linear_loop.sampled_margin(1.0, 1.0, 1.0, 1.0, 0.1, math.inf), "delay_samples is inf"),  # type: ignore[arg-type]
+        (lambda: IntegralLoop(1.0, sample_period=0.1, delay_samples=math.nan), "delay_samples is nan"),  # type: ignore[arg-type]
         (lambda: requisites.useful_length(5.0, 3.2), "angle is 3.2 rad"),
         (lambda: stiction.breakaway_delay(1.0, 1.0, 1.0, 1.0, 1.5), "spring_force is 1.5"),
         (lambda: stiction.breakaway_delay(1.0, 1.0, 1.0, math.nan), "error is nan"),
