@@ -314,6 +314,9 @@ class ForceAxes:
         across = np.vstack([tangential, *others]) if others else tangential
         spread += across.T.dot(across)
         moved *= position_sd**2
+        if not (place.is_known or push is aside):  # the side of the link may press, not its end
+            leaning = size * (direction - aside).dot(jacobian)
+            moved += outer(leaning, leaning)
         weight = inverse(spread + moved)
         inertia = self.inertia(q)
         least = parameters.least_apparent_mass * square if parameters.least_apparent_mass else -math.inf
@@ -326,7 +329,6 @@ class ForceAxes:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
         friction_sd = length(across.dot(sense))
         place_sd = math.sqrt(float(sense.dot(moved).dot(sense)))
-        yielding = float(lever.dot(self._compliance).dot(lever))
         return ForceAxis(
             lever,
             press,
@@ -339,7 +341,7 @@ class ForceAxes:
             mass,
             impact,
             square / damped,
-            yielding,
+            float(lever.dot(self._compliance).dot(lever)),
             weight,
             spread,
         )
