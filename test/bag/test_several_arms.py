@@ -111,7 +111,6 @@ def merged(parts: list[Path], file: Path) -> Path:
 
 @pytest.mark.slow
 def test_bags_of_two_arms_that_another_tool_merged_keep_what_each_had(tmp_path: Path) -> None:
-    """The parameters and the counts of the arm that came first were lost."""
     sections, files = Configuration.load(packaged("wam")).sections, []
     for namespace, mass in (("left", 1.0), ("right", 2.0)):
         with BagWriter(tmp_path / namespace) as bag:

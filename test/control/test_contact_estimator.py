@@ -149,7 +149,6 @@ def test_a_push_on_the_inner_link_whose_torques_are_those_of_one_along_the_outer
 
 @pytest.mark.slow
 def test_joint_sensors_locate_a_push_on_an_arm_in_motion() -> None:
-    """In the pose of now, 20 ms later than that of the torques, the place was off by 17 mm."""
     arm, estimator = RigidArm(ARM, (0.2, -1.05, 0.3, 0.5), friction=0.0), ContactEstimator(ARM, TIMING, SENSORS)
     drive = np.array([joint_torques(one) for one in np.eye(4)]).T
     errors = []

@@ -44,7 +44,6 @@ def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simula
     ("q", "newtons"), [((0.0, -1.0, 0.0, math.pi / 2.0 - 0.2), 15.0), ((-2.2, -1.03, 1.34, 0.7), 15.0)]
 )
 def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...], newtons: float) -> None:
-    """Near a straight elbow a force along the arm turned the joints back and forth by 3.9 to 5 rad/s."""
     tip = BODY.point(q, OUTER, (WAM.covers.length[-1], 0.0, 0.0))
     command = ForceCommand("base", triple(newtons * tip / np.linalg.norm(tip)))
     given = {"force_loop:contact_source": "pinned", "force_loop:contact_position": 0.4, "force_loop:guard.mode": "warn"}
@@ -100,7 +99,6 @@ def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
 
 @pytest.mark.slow
 def test_a_payload_that_a_scenario_tares_is_no_part_of_a_force_in_another_pose() -> None:
-    """With a zero of torques of one pose, 9.2 N pressed in place of 8 N."""
     rest, press = (0.0, -1.0, 0.0, 1.0), ForceCommand(OUTER, (0.0, -8.0, 0.0))
     steps = [
         ScenarioStep("release", 0.3, request="enable"),
@@ -140,3 +138,17 @@ def test_a_hand_leads_the_arm_from_its_motors_with_the_dither(newtons: float, le
         places.append(BODY.point(run.driver.plant.q, OUTER, (0.35, 0.0, 0.0)))
     moved = 1e3 * float(np.linalg.norm(places[2000] - places[1000]))
     assert least <= moved <= most, "mm"
+
+
+@pytest.mark.slow
+def test_a_spring_presses_from_its_motors_as_hard_as_it_is_compressed() -> None:
+    """While a force counted only from where a contact was certain, it swung between 0 and 24 N."""
+    q, inner, against = (-0.38, -0.83, 1.71, 1.01), "inner_link", (-0.3550, 0.6840, 0.6373)
+    task = Task(q, Surface(inner, 0.4, against, 14000.0, 0.3, is_plane=False), 8.0, is_dithered=True)
+    compressed = 8.0 / 12.0 * np.array(against) @ BODY.point_jacobian(q, inner, (0.4, 0.0, 0.0))
+    springs = (axis._replace(stiffness=12.0) for axis in joint_axes(AxisKind.IMPEDANCE, (q + compressed).tolist(), 5.0))
+    press = ScenarioStep("press", 4.0, request="enable", task=TaskCommand("base", tuple(springs)))
+    run = Simulation(configured(CONFIGURATION, task), [press])
+    assert run.play() == ""
+    forces = [math.hypot(*row.values[:3]) for row in run.rows["sim/contact/wrench"][-200:]]
+    assert forces == pytest.approx([8.0] * 200, abs=1.6)

@@ -226,7 +226,6 @@ def test_a_force_that_follows_a_sine_of_its_set_point_is_no_oscillation() -> Non
 
 @pytest.mark.parametrize(("lasting", "is_reported"), [(0.085, False), (1.0, True)])
 def test_an_impact_that_bounces_is_no_oscillation(lasting: float, is_reported: bool) -> None:
-    """At a touch the force turned back five times in 75 ms."""
     pressed = Pressed()
     found = pressed.go(2.0, lambda time: FORCE + (0.9 * (-1) ** int(time / 0.015) if time < lasting else 0.0))
     assert any(event.code is Code.OSCILLATING for events in found for event in events) is is_reported

@@ -93,7 +93,6 @@ def test_an_arm_that_is_pushed_gives_way_no_further_than_allowed_and_comes_back(
 
 @pytest.mark.slow
 def test_pushes_again_and_again_move_it_no_further_than_one() -> None:
-    """Five times: the tool had moved by 1.77 m."""
     arm = Pushed(HOLDS, 8.0)
     arm.go(0.3)
     begin, ways = arm.at, []

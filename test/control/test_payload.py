@@ -146,7 +146,6 @@ def test_a_mass_picked_up_in_motion_is_carried_as_if_the_arm_had_it_and_reset_se
 
 @pytest.mark.slow
 def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at_rest() -> None:
-    """At 1.6 rad/s the payload was taken for an error of the motion, and 11.1 N were true of 10."""
     given = {
         **PINNED,
         "arm.joints.start": [-0.9, *DEMO[1:]],

@@ -665,7 +665,6 @@ def test_numbers_of_a_step_made_in_python_are_those_of_a_file(
 
 
 def test_what_a_step_made_in_python_sets_has_to_fit_the_other_values_of_its_node() -> None:
-    """It ended the run in the step that set it."""
     text = "the scenario, step 2: set, driver: .*added_coulomb_friction"
     with pytest.raises(ParameterError, match=text):
         Simulation(

@@ -83,7 +83,6 @@ def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_
 @pytest.mark.slow
 @pytest.mark.parametrize("is_task", [True])
 def test_a_force_stays_right_when_the_link_slides_back_under_other_axes(is_task: bool) -> None:
-    """The way back counted from zero: 5.8 N of 5.  What a task presses was taken for 0.5 kg at the tool."""
     q = (0.0, -1.0, 0.0, 0.6)
     rotation = BODY.cover_pose(q, OUTER).rotation
     surface = Surface(OUTER, 0.35, triple(rotation[:, 1]), 4000.0, 0.04, is_plane=False)
@@ -118,7 +117,6 @@ def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize(("place", "newtons"), [(0.35, 6.5)])
 def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: float, newtons: float) -> None:
-    """After a motion along the link, by 6 cm: it went back at its full speed, and pressed with up to 25 N of 6.5."""
     q = (0.0, -1.0, 0.0, 0.6)
     rotation = BODY.cover_pose(q, OUTER).rotation
     surface = Surface(OUTER, place, triple(rotation[:, 1]), 4000.0, 0.3, is_plane=False)

@@ -421,7 +421,6 @@ def test_cables_tightened_to_a_share_are_those_of_an_arm_with_that_pretension(sh
 @pytest.mark.parametrize("slack", [True, False])
 @pytest.mark.parametrize("shares", [[-1.0], [math.nan], [math.inf], [], [0.5, 0.5]])
 def test_a_pretension_that_is_refused_changes_nothing(shares: list[float], slack: bool) -> None:
-    """A negative one was refused, or not without slack, and remained."""
     plant = plant_of(damped(one_joint()), slack=slack, tension_friction=(1e-4,), creep=True)
     plant.set_pretension([0.5])
     before = repr((strands(plant), plant.data.plastic.tolist(), plant._friction.levels, plant._circuits.each))

@@ -409,7 +409,6 @@ class Waiting(Inner):
 
 
 def test_a_topic_of_the_outer_rate_between_two_outer_periods_is_refused_with_the_node_that_returned_it() -> None:
-    """Four of five of these commands were dropped by the nodes that take them."""
     wam, steps = without(Configuration.load(packaged("wam")), "force_loop"), [ScenarioStep("wait", 0.1)]
     text = (
         "node 'inner' returned an unusable joint_velocity_command: it is sent at the outer rate, .* write thinned=True"

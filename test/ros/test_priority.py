@@ -84,7 +84,6 @@ def test_without_permission_everything_is_as_usual() -> None:
 
 @pytest.mark.parametrize("used", [1.6, 1.8])
 def test_a_process_that_takes_a_whole_processor_gives_its_priority_back(used: float) -> None:
-    """It used 1.6 or 1.8 s of 2.1 s; the look after 1.0 s was too early.  A program of the operator has to run, too."""
     done = subprocess.run(
         [sys.executable, "-c", GIVEN_BACK, str(used)],
         capture_output=True,

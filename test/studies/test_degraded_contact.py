@@ -94,7 +94,6 @@ def table(title: str, drives: list[ContactScore]) -> ScoreTable:
 
 
 def test_the_sets_are_counted_by_force_too() -> None:
-    """Of all forces together the sets of strong ones, a third of which held the truth, were hidden by the others."""
     light = TOUCH
     strong = light._replace(force=40.0, in_set=False)
     held = column_of(table("By kind", driven(scored(light, strong, strong))), "90 % set contains the truth [%]")

@@ -170,8 +170,9 @@ class ForceLoop:
             self._reset()
         given = self._measurable(given)
         contact = given.contact or NO_CONTACT
-        is_touched = bool(contact.cover) or self._run.is_touching
-        self._measurement.step(own, given, is_touched)
+        # a spring to which a force counts only from where it is certain would swing about there
+        springs = given.task is not None and any(axis.stiffness for axis in given.task.axes)
+        self._measurement.step(own, given, bool(contact.cover) or self._run.is_touching or springs)
         topic = "force_command" if given.task is None else "task_command"
         if given.task is None and given.torque is not None and own.mode != "open_loop":
             topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
