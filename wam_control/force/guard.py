@@ -249,7 +249,8 @@ class Watch:
             guarded = where()
             contacts = [contact for each in guarded for contact in each.contacts]
             gains = [*guarded[0].gain.tolist(), *guarded[0].proportional_gain.tolist()] if guarded else self._gains
-            if contacts and (gains != self._gains or self._is_elsewhere(contacts)):
+            is_other = gains != self._gains or len(contacts) != len(self.assessed)
+            if contacts and (is_other or any(map(_is_apart, contacts, self.assessed))):
                 self._work = self._assess(guarded, contacts, gains)
             else:
                 self.is_assessed = True
@@ -268,9 +269,6 @@ class Watch:
             yield False
         self.assessed, self._gains = contacts, gains
         self.scale, self.factor = least, min(least / self.needed, 1.0)
-
-    def _is_elsewhere(self, contacts: Sequence[GuardedContact]) -> bool:
-        return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
 
 
 def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:
