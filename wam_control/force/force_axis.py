@@ -314,9 +314,6 @@ class ForceAxes:
         across = np.vstack([tangential, *others]) if others else tangential
         spread += across.T.dot(across)
         moved *= position_sd**2
-        if not (place.is_known or push is aside):  # the side of the link may press, not its end
-            leaning = size * (direction - aside).dot(jacobian)
-            moved += outer(leaning, leaning)
         weight = inverse(spread + moved)
         inertia = self.inertia(q)
         least = parameters.least_apparent_mass * square if parameters.least_apparent_mass else -math.inf
