@@ -85,8 +85,7 @@ class IntegralLoop:
         if not self.error_limit > self.deadband:
             raise ValueError(f"error_limit is {self.error_limit}; it must be above the deadband, {self.deadband}")
         require("sample_period", self.sample_period, at_least=0.0)
-        if not self.delay_samples >= 0 or self.delay_samples % 1:
-            raise ValueError(f"delay_samples is {self.delay_samples}; it must be a whole number, zero or more")
+        require_whole("delay_samples", self.delay_samples)
         if self.delay_samples and not self.sample_period:
             raise ValueError(f"delay_samples is {self.delay_samples}; without a sample_period it must be zero")
 
@@ -113,3 +112,14 @@ def require(name: str, value: float, above: float | None = None, at_least: float
         raise ValueError(f"{name} is {value}; it must be finite and above {above:g}")
     if at_least is not None and not at_least <= value < _INF:
         raise ValueError(f"{name} is {value}; it must be finite and at least {at_least:g}")
+
+
+def require_whole(name: str, value: float) -> None:
+    """Refuse a value that is not a whole number, zero or more.
+
+    Parameters
+    ----------
+    name, value : of the argument.
+    """
+    if not value >= 0 or value % 1:
+        raise ValueError(f"{name} is {value}; it must be a whole number, zero or more")

@@ -14,6 +14,7 @@ from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.arguments import Array, above_zero, finite, zero_or_more
+from wam_theory.friction_model import require_whole
 from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
 
@@ -236,8 +237,7 @@ def sampled_margin(
             sample_period=sample_period,
         )
     )
-    if not delay_samples >= 0 or delay_samples % 1:
-        raise ValueError(f"delay_samples is {delay_samples}; it must be a whole number, zero or more")
+    require_whole("delay_samples", delay_samples)
     fast = _fast_margin(j, b, ktr, kc, period, int(delay_samples))
     if fast.frequency * period < SEARCH.fast and fast.frequency * period * (delay_samples + 0.5) < SEARCH.short_delay:
         return fast

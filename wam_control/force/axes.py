@@ -4,7 +4,6 @@ A force command is a task with one force axis, joint torques are a task with one
 alone is a task without axes.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -43,11 +42,6 @@ class CommandedAxis(NamedTuple):
     def is_force(self) -> bool:
         """Whether a force or a torque is commanded along it."""
         return self.of.kind is AxisKind.FORCE
-
-    @property
-    def is_fed_back(self) -> bool:
-        """Whether its velocity follows from a force or a torque that is measured along it."""
-        return self.of.is_sensed and (self.sensed is None or self.sensed.force_sd < math.inf)
 
     @property
     def is_joint(self) -> bool:

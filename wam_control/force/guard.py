@@ -131,7 +131,7 @@ class Supervision:
             "domain": str(assessment.domain),
             "margin": margin_text(assessment.scale),
             "margin here": margin_text(here, watch.needed if watch.assessed else GUARD.largest_scale),
-            "pose of margin here": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
+            "pose of margin here": f"{posture_of(watch.assessed[0].contacts[0])}, when a force was last commanded"
             if watch.assessed
             else UNKNOWN,
             "gains multiplied by": f"{factor:.4g}",
@@ -166,12 +166,12 @@ class Supervision:
         """
         own, contacts = self.parameters, []
         for axis in axes:
-            if axis.place is not None and axis.is_fed_back:
+            if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < np.inf:
                 direction = triple(axis.direction)
                 contacts.append(GuardedContact(tuple(q), *axis.place[:3], direction, axis.desired or FORCE.hand))
         if contacts:
             together = [tuple(contacts)]
-        elif any(axis.is_joint and axis.is_fed_back for axis in axes):
+        elif any(axis.is_joint and axis.of.is_sensed for axis in axes):
             anywhere = TaskAxis(AxisKind.FORCE, position=None)
             places = ContactPlace(self.guard.arm.covers).step(anywhere, contact, 0.0, own)
             alone = (self.guard.contacts(q, *place[:3], [FORCE.sized_force]) for place in places)
@@ -219,14 +219,14 @@ class Watch:
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
     needed : demanded `scale`, and the largest one that is tried: the true limit may be above it.
-    assessed : contacts of the last assessment, none before the first.
+    assessed : forces of the last assessment, none before the first.
     is_assessed : whether what is commanded has been assessed, or presses nowhere.
     """
 
     def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment) -> None:
         self._guard, self._task = guard, task
         self.needed = 1.0 / guard.parameters.stability_fraction
-        self.assessed, self._gains = list[GuardedContact](), list[float]()
+        self.assessed: Sequence[GuardedForces] = ()
         self.factor, self.scale = 1.0, found.scale
         self.restart()
 
@@ -247,11 +247,9 @@ class Watch:
         if self._work is None and self._since >= self._guard.parameters.interval:
             self._since = 0.0
             guarded = where()
-            contacts = [contact for each in guarded for contact in each.contacts]
-            gains = [*guarded[0].gain.tolist(), *guarded[0].proportional_gain.tolist()] if guarded else self._gains
-            is_other = gains != self._gains or len(contacts) != len(self.assessed)
-            if contacts and (is_other or any(map(_is_apart, contacts, self.assessed))):
-                self._work = self._assess(guarded, contacts, gains)
+            is_other = len(guarded) != len(self.assessed) or any(map(_differs, guarded, self.assessed))
+            if guarded and is_other:
+                self._work = self._assess(guarded)
             else:
                 self.is_assessed = True
         has_ended = self._work is not None and next(self._work, True)
@@ -259,16 +257,22 @@ class Watch:
             self._work, self.is_assessed = None, True
         return has_ended
 
-    def _assess(
-        self, guarded: Sequence[GuardedForces], contacts: list[GuardedContact], gains: list[float]
-    ) -> Iterator[bool]:
+    def _assess(self, guarded: Sequence[GuardedForces]) -> Iterator[bool]:
         """One scale in each period; never true."""
         least = math.inf
         for scale in self._guard.scales(self._task, guarded, [part * self.needed for part in GUARD.scales]):
             least = min(least, scale)
             yield False
-        self.assessed, self._gains = contacts, gains
-        self.scale, self.factor = least, min(least / self.needed, 1.0)
+        self.assessed, self.scale, self.factor = guarded, least, min(least / self.needed, 1.0)
+
+
+def _differs(one: GuardedForces, other: GuardedForces) -> bool:
+    """Whether forces have other contacts or gains."""
+    if len(one.contacts) != len(other.contacts) or any(map(_is_apart, one.contacts, other.contacts)):
+        return True
+    return (
+        one.gain.tolist() != other.gain.tolist() or one.proportional_gain.tolist() != other.proportional_gain.tolist()
+    )
 
 
 def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:
