@@ -180,9 +180,14 @@ class Decoder:
         if not fields and not self._is_packed:
             reading.skip(1)
         if kind not in self._classes:
-            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
-            self._classes[kind] = namedtuple(kind.rpartition("/")[2], names)
+            self._classes[kind] = _message_class(kind, *(name for name, _, _ in fields))
         return self._classes[kind](*values)
+
+
+@cache
+def _message_class(kind: str, *fields: str) -> Any:
+    """A class of messages with these fields: most topics of a bag have a header, and making one takes long."""
+    return namedtuple(kind.rpartition("/")[2], [name + "_" * keyword.iskeyword(name) for name in fields])
 
 
 @cache
