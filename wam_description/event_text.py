@@ -218,13 +218,13 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     has_touched, way = values.get("has_touched", 0.0) > 0.0, values.get("way", 0.0)
     push, ago = values.get("push"), values.get("ago", 0.0)
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
-    calm = NO_DITHER * (values.get("dither", 0.0) > 0.0) + "lower force_gain"
+    calm = NO_DITHER * (values.get("dither", 0.0) > 0.0) + "hold the surface still, or lower force_gain"
     is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
     found = {
         "travel": f"{abs(way):.3g} m {'against' if way < 0.0 else 'along'}",
         "since": SINCE[values.get("has_settled", 0.0) > 0.0],
         "reach": REACH[2 if is_pulled else has_touched],
-        "calm": "lower force_gain, or use joint sensors" if "motors" in source else calm,
+        "calm": "hold the surface still, lower force_gain, or use joint sensors" if "motors" in source else calm,
         "less": f"a push {acts} ({push}); push less, or {LESS}" if push else LESS,
         "lamps": f" (the pendant shows a fault of the {detail}{FAST * ('velocity' in detail)})" if detail else "",
         "hidden": ", friction of motors at rest hides a part of it" * (source == "motors"),
