@@ -115,6 +115,11 @@ class Shaking:
             self._free = [forces.vibration(q, one[0], i * frequency, one[1], servo) for i, one in enumerate(each, 1)]
         return True
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether the vibration is still being watched."""
+        return bool(self._poses) and self._free is None
+
     def swing(self, axis: CommandedAxis, own: ForceLoopParameters) -> float:
         """Swing of the force on the stiffest surface, N peak to peak."""
         if not self._free or axis.sensed is None or axis.sensed.force_sd == math.inf:

@@ -478,8 +478,8 @@ class ForceLoop:
         is_refused = is_one and any(event.holds and event.cause == "error" for event in found)
         if not is_refused or task != run.sought:  # what helps another force need not help this one
             run.search, run.ways, run.sought = None, {}, task
-        if not is_refused or task is None:
-            return found
+        if not is_refused or task is None or (run.shaking.is_watched and not run.is_touching):
+            return found  # a larger force would shake, too
         places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)]
         run.search = run.search or tries(
             self._q,
