@@ -169,7 +169,7 @@ class IdentificationThresholds:
     friction: float = 0.5  # of the present Coulomb friction
     load: float = 0.1  # friction per transmitted torque
     viscous: float = 1.0  # of the present viscous friction
-    stribeck: float = 1.5  # rad/s, and the least that a fit begins with: a smaller one is hardly seen
+    stribeck: float = 3.0  # rad/s, and the least that a fit begins with: amid the usual ones, from 0.5 to 20
     rotor: float = 0.2  # of the present rotor inertia
     constants_difference: float = 0.012  # half the difference of two torque constants, each calibrated to 3 %, uniform
     mass: float = 0.3  # of the present mass

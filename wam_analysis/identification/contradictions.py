@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.identification.fit import Identification
+from wam_analysis.identification.fit import Identification, rms
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.regressor import Regressor
-from wam_analysis.identification.unknowns import DIRECTIONS, Unknowns
+from wam_analysis.identification.unknowns import Unknowns
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
@@ -34,10 +34,13 @@ class Mistake(StrEnum):
     )
     SWAPPED = "the torques fit if the names of the motors {about} are exchanged"
     # the torques of a motor are not those of any arm
-    UNEXPLAINED = "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm?"
+    UNEXPLAINED = (
+        "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm, is its base tilted, "
+        "are torques late or cut off, or angles in another unit?"
+    )
     WEIGHT = (
-        "the links weigh {size:.2g} times as much as configured: a payload that is not in arm.payload, or a long "
-        "contact?"
+        "the links weigh {size:.2g} times as much as configured: a payload that is not in arm.payload, another base, "
+        "torques without gravity, or a long contact?"
     )
     NO_FRICTION = "no friction is left at {about}: did something push the arm along its motion?"
 
@@ -61,22 +64,17 @@ def contradictions(shared: Shared, motion: MotionSamples, found: Identification)
 
 
 def _symptoms(shared: Shared, motion: MotionSamples, found: Identification) -> Iterator[Contradiction]:
-    unknowns, motors = found.unknowns, shared.arm.motors.names
-    level = np.mean([found.values[unknowns.places(f"motors.coulomb_{way}")] for way in DIRECTIONS], axis=0)
-    for name, left, friction in zip(motors, found.residual, level, strict=True):
-        share = float(left / max(friction, IDENTIFY.least_friction))
+    unknowns, regressor = found.unknowns, Regressor(shared, found.unknowns, motion)
+    for name, share in zip(shared.arm.motors.names, found.unexplained.tolist(), strict=True):
         if share > IDENTIFY.contradicted:
             yield Contradiction(Mistake.UNEXPLAINED, (name,), share)
-    regressor = Regressor(shared, unknowns, motion)
-    before, now = (
-        np.abs(np.sum(regressor.joint_torques(each), axis=(0, 3))).sum() for each in (unknowns.present, found.values)
-    )
-    if not 1.0 / IDENTIFY.heavier < now / before < IDENTIFY.heavier:
-        yield Contradiction(Mistake.WEIGHT, (), float(now / before))
-    present = unknowns.present
+    before, now = (np.sum(regressor.joint_torques(each), axis=(0, 3)) for each in (unknowns.present, found.values))
+    heavier = _ratio(before, now, regressor.is_used)
+    if not 1.0 / IDENTIFY.heavier < heavier < IDENTIFY.heavier:
+        yield Contradiction(Mistake.WEIGHT, (), heavier)
     for i, name in enumerate(unknowns.names):
         is_friction = name.startswith(("motors.coulomb_", "joints.coulomb."))
-        if is_friction and found.is_identified[i] and found.values[i] < IDENTIFY.least_share * present[i]:
+        if is_friction and found.is_identified[i] and found.values[i] < IDENTIFY.least_share * unknowns.present[i]:
             yield Contradiction(Mistake.NO_FRICTION, (name.rpartition(".")[2],), float(found.values[i]))
 
 
@@ -86,12 +84,12 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
     model, torque, used = _torques(shared, unknowns, motion)
     as_recorded = _misfit(model, torque, used)
     scale = _ratio(model, torque, used)
-    tried = [(_misfit(model, torque / scale, used), Contradiction(Mistake.SCALED, (), scale))]
+    tried = [(_misfit(scale * model, torque, used), Contradiction(Mistake.SCALED, (), scale))]
     for i, name in enumerate(motors):
         one = np.ones(len(motors))
-        one[i] = _ratio(model[:, [i]], torque[:, [i]], used[:, [i]])
+        one[i] = _ratio(model[:, i], torque[:, i], used[:, i])
         mistake = Contradiction(Mistake.SCALED_MOTOR, (name,), float(one[i]))
-        tried.append((_misfit(model, torque / one, used), mistake))
+        tried.append((_misfit(one * model, torque, used), mistake))
     # a factor that a torque constant or a mass may be wrong by is no mistake
     tried = [one for one in tried if not 1.0 / IDENTIFY.heavier < one[1].size < IDENTIFY.heavier]
     for pair in combinations(range(len(motors)), 2):
@@ -104,22 +102,21 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
 
 def _torques(shared: Shared, unknowns: Unknowns, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
     """Torques of the configured arm and the recorded ones, N m, and where they count, (k, n) each."""
-    equations = Regressor(shared, unknowns, motion).equations(unknowns.present)
+    equations = Regressor(shared, unknowns, motion, IDENTIFY.least_motion).equations(unknowns.present)
     return equations.columns @ unknowns.present + motion.torque - equations.torque, motion.torque, equations.is_used
 
 
 def _misfit(model: Numbers, torque: Numbers, used: Mask) -> float:
     """Rms difference per rms torque of the model, the mean over motors."""
-    counts = np.maximum(used.sum(0), 1)
-    left, size = (np.sqrt((each**2 * used).sum(0) / counts) for each in (torque - model, model))
+    left, size = rms(torque - model, used), rms(model, used)
     moved = used.any(0)
     return float(np.mean(left[moved] / np.maximum(size[moved], IDENTIFY.least_friction))) if moved.any() else 0.0
 
 
 def _ratio(model: Numbers, torque: Numbers, used: Mask) -> float:
     """How many times the torques of the model the recorded ones are; 1 where that is not known."""
-    product, square = float((model * torque * used).sum()), float((model**2 * used).sum())
-    return product / square if square and product else 1.0
+    square = float((model**2 * used).sum())
+    return float((model * torque * used).sum()) / square if square else 1.0
 
 
 def _swapped(motion: MotionSamples, i: int, j: int) -> MotionSamples:

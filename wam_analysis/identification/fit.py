@@ -73,6 +73,12 @@ class Identification(NamedTuple):
         return 0.5 * (self.values[negative] - self.values[positive]), 0.5 * np.sqrt(np.maximum(both, 0.0))
 
     @property
+    def unexplained(self) -> Numbers:
+        """(n,), rms torque of each motor that the estimate does not explain, per Coulomb friction."""
+        level = np.mean([self.values[self.unknowns.places(f"motors.coulomb_{way}")] for way in DIRECTIONS], axis=0)
+        return np.asarray(self.residual / np.maximum(level, IDENTIFY.least_friction), np.float64)
+
+    @property
     def is_identified(self) -> Mask:
         """(p,), whether the motion shows a parameter by itself."""
         return self.sd <= IDENTIFY.identified * self.unknowns.prior_sd
@@ -88,9 +94,10 @@ class _Estimate(NamedTuple):
 
     equations: Equations
     part: Rows
+    weights: Numbers  # (k, n), 1/(N^2 m^2)
     values: Numbers
     without: Numbers  # (parts, p), estimates without each part
-    prior_sd: Numbers
+    prior: Numbers  # (p, p), information before the motion, large where a value is at its limit
     information: Numbers  # (p, p), of all parts
     held_out: Numbers
 
@@ -109,48 +116,58 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
         if no motor turns in one direction for long enough.
     """
     sought = unknowns(shared)
-    still = _still(shared, Regressor(shared, sought, motion).equations(sought.present))
+    regressor = Regressor(shared, sought, motion, IDENTIFY.least_motion)
+    still = _still(shared, regressor)
     if len(still) == len(shared.arm.joints.names):
         raise ValueError(
             f"no joint turns freely for {IDENTIFY.least_motion:g} s: let each motor turn, faster than "
             f"{IDENTIFY.slowest_motor:g} rad/s, in both directions"
         )
-    sought = with_kept_weight(sought, shared, still)
-    regressor = Regressor(shared, sought, motion)
+    sought = regressor.unknowns = with_kept_weight(sought, shared, still)
     best = _estimate(regressor)
-    moved = _moved_by_averaging(best, sought._replace(prior_sd=best.prior_sd).prior)
+    moved = _moved_by_averaging(best)
     best = best._replace(values=np.maximum(best.values + moved, _least(sought)))
-    uncertainty = _uncertainty(regressor, best, moved)
+    uncertainty = _uncertainty(regressor, best)
     tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
     return _result(sought, best, uncertainty, tracked)
 
 
-def _still(shared: Shared, equations: Equations) -> list[int]:
+def _still(shared: Shared, regressor: Regressor) -> list[int]:
     """Joints of which a motor does not move enough to show their torques."""
-    seconds = equations.is_used.sum(0) * float(np.median(np.diff(equations.time)))
-    matrix = TransmissionMap.of(shared.arm).joint_from_motor
-    return [j for j, row in enumerate(matrix) if (seconds[row != 0.0] < IDENTIFY.least_motion).any()]
+    moves, matrix = regressor.is_used.any(0), TransmissionMap.of(shared.arm).joint_from_motor
+    return [j for j, row in enumerate(matrix) if not moves[row != 0.0].all()]
 
 
 def _estimate(regressor: Regressor) -> _Estimate:
     sought = regressor.unknowns
-    values, prior_sd, centre = sought.present.copy(), sought.prior_sd.copy(), sought.present.copy()
+    values, least = sought.present.copy(), _least(sought)
     velocities = sought.places("motors.stribeck_velocity")
     values[velocities] = np.maximum(values[velocities], IDENTIFY.stribeck)
-    least = _least(sought)
     for _ in range(IDENTIFY.iterations):
-        equations = regressor.equations(values)
+        equations, before = regressor.equations(values), values[velocities]
         part = np.arange(len(equations.time)) * IDENTIFY.parts // len(equations.time)  # of each sample
-        each = _normal(equations, part, values)
+        weights = _weights(equations, values)
+        each = _normal(equations, part, weights)
         information, vector = (one.sum(0) for one in each)
-        values = _solve(information, vector, sought._replace(prior_sd=prior_sd).prior, centre)
+        values, prior = _limited(information, vector, sought, least)
+        # the curve is not linear in them: a longer step may end where no friction drops, and no step leads back
+        values[velocities] = np.clip(values[velocities], before / 2.0, before * 2.0)
+    without = np.array(
+        [_solve(information - i, vector - v, sought.prior, sought.present) for i, v in zip(*each, strict=True)]
+    )
+    left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
+    return _Estimate(equations, part, weights, values, without, prior, information, rms(left, equations.is_used))
+
+
+def _limited(information: Numbers, vector: Numbers, sought: Unknowns, least: Numbers) -> tuple[Numbers, Numbers]:
+    """Solution with no value below its least, (p,), and the prior that it has then, (p, p)."""
+    prior_sd, centre = sought.prior_sd.copy(), sought.present.copy()
+    for _ in range(IDENTIFY.iterations):
+        prior = sought._replace(prior_sd=prior_sd).prior
+        values = _solve(information, vector, prior, centre)
         below = values < least
         prior_sd[below], centre[below] = IDENTIFY.pinned * sought.prior_sd[below], least[below]
-        values = np.maximum(values, least)
-    prior = sought._replace(prior_sd=prior_sd).prior
-    without = np.array([_solve(information - i, vector - v, prior, centre) for i, v in zip(*each, strict=True)])
-    left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
-    return _Estimate(equations, part, values, without, prior_sd, information, _rms(left, equations.is_used))
+    return np.maximum(values, least), prior
 
 
 def _least(sought: Unknowns) -> Numbers:
@@ -162,24 +179,20 @@ def _least(sought: Unknowns) -> Numbers:
     return least
 
 
-def _normal(equations: Equations, part: Rows, values: Numbers) -> tuple[Numbers, Numbers]:
-    """Weighted normal equations by part of the motion, (parts, p, p) and (parts, p).
-
-    Rows far from the present estimate count less (Huber).
-    """
-    weight = _weights(equations, values)
+def _normal(equations: Equations, part: Rows, weights: Numbers) -> tuple[Numbers, Numbers]:
+    """Weighted normal equations by part of the motion, (parts, p, p) and (parts, p)."""
     p = equations.columns.shape[2]
     information, vector = np.zeros((IDENTIFY.parts, p, p)), np.zeros((IDENTIFY.parts, p))
     for i in range(IDENTIFY.parts):
         rows = equations.columns[part == i].reshape(-1, p)
-        weighted = rows * weight[part == i].reshape(-1, 1)
+        weighted = rows * weights[part == i].reshape(-1, 1)
         information[i] = weighted.T @ rows
         vector[i] = weighted.T @ equations.torque[part == i].ravel()
     return information, vector
 
 
 def _weights(equations: Equations, values: Numbers) -> Numbers:
-    """Weights of the rows, (k, n), 1/(N^2 m^2)."""
+    """Weights of the rows, (k, n), 1/(N^2 m^2): those far from the present estimate count less (Huber)."""
     left = equations.torque - equations.columns @ values
     scale = np.array([_deviation(left[used, i]) for i, used in enumerate(equations.is_used.T)])
     return np.minimum(1.0, IDENTIFY.huber * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
@@ -194,13 +207,14 @@ def _solve(information: Numbers, vector: Numbers, prior: Numbers, centre: Number
     return np.asarray(np.linalg.solve(information + prior, vector + prior @ centre), np.float64)
 
 
-def _rms(left: Numbers, is_used: Mask) -> Numbers:
+def rms(left: Numbers, is_used: Mask) -> Numbers:
+    """Rms, (n,), of what is left of the torques, (k, n), where they are used."""
     counts = np.maximum(is_used.sum(0), 1)
     return np.sqrt((left**2 * is_used).sum(0) / counts)
 
 
-def _uncertainty(regressor: Regressor, best: _Estimate, moved: Numbers) -> Uncertainty:
-    """Of the estimate: also by what the law of friction and the equations leave out, and what averaging moves.
+def _uncertainty(regressor: Regressor, best: _Estimate) -> Uncertainty:
+    """Of the estimate: also by what the law of friction and the equations leave out, what averaging and limits move.
 
     The equations leave out the asymmetry of the joints' load friction, and the friction of own joints as a load: it
     adds to the load of its motor's friction or takes from it, by the way of the load.
@@ -215,19 +229,21 @@ def _uncertainty(regressor: Regressor, best: _Estimate, moved: Numbers) -> Uncer
     carried = regressor.carried_friction(values)
     carried = carried[..., None] * np.eye(carried.shape[1])
     unknown = np.concatenate((regressor.asymmetric_loads(values) * asymmetry, carried), axis=2)
-    weighted = equations.columns * _weights(equations, values)[..., None]
+    weighted = equations.columns * best.weights[..., None]
     taken = white @ np.einsum("knp,knj->pj", weighted, unknown, optimize=True)
+    # by an error of the model a value would be beyond its limit: the limit moves all values
+    moved = values - best.without.mean(0)
     return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
 
 
-def _moved_by_averaging(best: _Estimate, prior: Numbers) -> Numbers:
+def _moved_by_averaging(best: _Estimate) -> Numbers:
     """By how much the estimate differs, (p,), where neighbouring equations are averaged, from that of the same ones.
 
     Of a right model it would not.  Torque ripple accelerates the rotors within a window, the cables give way to it and
     the servo follows, so that it is correlated with the acceleration: a part of it counts as inertia, with the same
     sign in all parts of the motion.  Averaging takes a part of it out; what is left may be as much.
     """
-    equations, weights = best.equations, _weights(best.equations, best.values)
+    equations, weights = best.equations, best.weights
     bell = np.hanning(IDENTIFY.averaged + 2)[1:-1]
     edge = IDENTIFY.averaged // 2
     middle = slice(edge, len(weights) - edge)
@@ -240,7 +256,7 @@ def _moved_by_averaging(best: _Estimate, prior: Numbers) -> Numbers:
     def solved(torque: Numbers, columns: Numbers) -> Numbers:
         weighted = columns * (weights[middle] * whole)[..., None]
         information = np.einsum("knp,knq->pq", weighted, columns, optimize=True)
-        return _solve(information, np.einsum("knp,kn->p", weighted, torque), prior, best.values)
+        return _solve(information, np.einsum("knp,kn->p", weighted, torque), best.prior, best.values)
 
     averaged = [
         np.asarray(sliding_window_view(each, IDENTIFY.averaged, 0) @ (bell / bell.sum()), np.float64)
@@ -255,22 +271,17 @@ def _result(sought: Unknowns, best: _Estimate, uncertainty: Uncertainty, tracked
     left = equations.torque - equations.columns @ best.values
     step = float(np.median(np.diff(equations.time)))
     moves = equations.columns[:, :, sought.places("motors.viscous")].diagonal(axis1=1, axis2=2)
-    both = [
-        sum(
-            bool((moves[best.part == i, m] > 0).any() and (moves[best.part == i, m] < 0).any())
-            for i in range(IDENTIFY.parts)
-        )
-        for m in range(moves.shape[1])
-    ]
+    by_part = [moves[best.part == i] for i in range(IDENTIFY.parts)]
+    both = np.sum([(each > 0.0).any(0) & (each < 0.0).any(0) for each in by_part], axis=0)
     return Identification(
         sought,
         best.values,
         uncertainty,
         1.0 / np.sqrt(np.maximum(best.information.diagonal(), 1e-300)),
-        _rms(left, equations.is_used),
+        rms(left, equations.is_used),
         best.held_out,
-        _rms(before, equations.is_used),
+        rms(before, equations.is_used),
         equations.is_used.sum(0) * step,
-        np.array(both),
+        both,
         tracked,
     )

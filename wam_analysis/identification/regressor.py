@@ -45,9 +45,14 @@ class Regressor:
     shared : arm and present model.
     unknowns : what is estimated.
     motion : samples.
+    least : s of motion of a motor, with less of which none is used.
+
+    Attributes
+    ----------
+    is_used : (k, n), as in `Equations`.
     """
 
-    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples) -> None:
+    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, least: float = 0.0) -> None:
         self._shared, self.unknowns, self._motion = shared, unknowns, motion
         self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
         # friction of joints with a motor of their own at that motor, N m: the cables transmit it
@@ -61,7 +66,8 @@ class Regressor:
         rest = np.zeros(qd.shape[1])
         self._weights = np.array([body.inverse_dynamics_regressor(each, rest, rest) for each in q])
         self._carried = (qdd * shared.model.joints.armature) @ self._matrix
-        self._is_used = self._steady()
+        steady = self._steady()
+        self.is_used = steady & (steady.sum(0) * float(np.median(np.diff(motion.time))) >= least)
 
     def _steady(self) -> Mask:
         """(k, n), whether a motor and its joints turn in one direction during the window."""
@@ -94,7 +100,7 @@ class Regressor:
         columns[:, :, at] = self._links @ jacobian
         torque = motion.torque - self._carried - self._links @ constant
         torque += columns[:, range(n), velocities] * values[velocities]
-        return Equations(motion.time, torque, columns, self._is_used)
+        return Equations(motion.time, torque, columns, self.is_used)
 
     def _by_stribeck(self, friction: Mapping[str, Numbers], values: Numbers) -> Numbers:
         """Torque per Stribeck velocity v_s at each state, (k, w, n), from the derivative of exp(-(v / v_s)^2)."""

@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.overlay import identified
 from wam_analysis.table import plain
@@ -75,7 +73,6 @@ def report(shared: Shared, found: Identification, label: str) -> str:
 
 def warnings(shared: Shared, found: Identification) -> Iterator[str]:
     """What the recording is too short or too slow for, and where the model does not fit."""
-    level = np.array([found.values[found.unknowns.places(f"motors.coulomb_{way}")] for way in ("positive", "negative")])
     for i, name in enumerate(shared.arm.motors.names):
         if found.seconds[i] < IDENTIFY.short:
             yield f"{name} turns freely for {found.seconds[i]:.1f} s only; record {IDENTIFY.short:g} s or more"
@@ -89,8 +86,7 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
                 f"{name}: in motion not used for the fit, {1e3 * found.held_out[i]:.3g} mN m remain unexplained, in "
                 f"the rest {1e3 * found.residual[i]:.3g} mN m; record more motion"
             )
-        share = found.residual[i] / max(level[:, i].mean(), 1e-9)
-        if share > IDENTIFY.remaining:
+        if (share := found.unexplained[i]) > IDENTIFY.remaining:
             yield (
                 f"{name}: {1e3 * found.residual[i]:.3g} mN m remain unexplained, {share:.0%} of its friction: "
                 "was the motion free of contact?"
