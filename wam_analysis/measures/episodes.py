@@ -88,7 +88,7 @@ class _Transient(NamedTuple):
 
 def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan) -> LimitCycle | None:
     """The cycle of a window, None where none is sure."""
-    if len(value) < 2 or not np.ptp(value) > least:
+    if not np.ptp(value) > least:
         return None
     cycle = limit_cycle(time, value, period)
     return (

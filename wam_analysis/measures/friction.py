@@ -103,7 +103,7 @@ def identify_friction(
     n = len(time)
     allowed = np.ones(n, dtype=np.bool_) if use is None else use.copy()
     allowed &= np.isfinite(velocity) & np.isfinite(torque)
-    if n < SHAFT.fewest_samples or np.count_nonzero(allowed) < SHAFT.fewest_samples:
+    if np.count_nonzero(allowed) < SHAFT.fewest_samples:
         return Friction()
     velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
     period = float(np.median(np.diff(time)))

@@ -118,7 +118,9 @@ def _period(flat: Numbers) -> float:
     before, peak, after = three[:, peaks]
     turn = np.clip(0.5 * (before + after) / peak, -1.0, 1.0)
     heights = np.hypot(peak, 0.5 * (after - before) / np.sqrt(np.maximum(1.0 - turn**2, 1e-300)))
-    return _top(likeness, first + 1 + int(peaks[heights >= CYCLE.correlated * np.max(heights)][0]))
+    row = int(peaks[heights >= CYCLE.correlated * np.max(heights)][0])
+    low, top, high = three[:, row].tolist()
+    return first + 1 + row + 0.5 * (low - high) / (low - 2.0 * top + high)  # where the parabola through them is highest
 
 
 def _refined(flat: Numbers, lag: float) -> float:
@@ -131,15 +133,6 @@ def _refined(flat: Numbers, lag: float) -> float:
     slope = float(np.polynomial.polynomial.polyfit(np.arange(len(phase)), phase, 1)[1])
     found = 1.0 / (1.0 / lag + slope / (2.0 * math.pi))
     return found if abs(found / lag - 1.0) < CYCLE.same_period else lag
-
-
-def _top(values: Numbers, row: int) -> float:
-    """Where the parabola through a sample and its two neighbours is highest."""
-    if not 0 < row < len(values) - 1:
-        return float(row)
-    a, b, c = (float(v) for v in values[row - 1 : row + 2])
-    bend = a - 2.0 * b + c
-    return row + 0.5 * (a - c) / bend if bend < 0.0 else float(row)
 
 
 class _Folded(NamedTuple):

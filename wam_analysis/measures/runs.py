@@ -102,14 +102,7 @@ def at_rest(velocity: Numbers, rest: float, shortest: int) -> Mask:
     velocity : (n,), rad/s or m/s, at a constant rate.
     rest : speed up to which it is at rest, above the sensor's noise.
     shortest : samples that a rest or a motion lasts at least; shorter ones are merged into their neighbours.
-
-    Raises
-    ------
-    ValueError
-        if `rest` is not above zero or the velocity is not finite.
     """
-    if not (rest > 0.0 and np.all(np.isfinite(velocity))):
-        raise ValueError(f"rest is {rest!r}; it must be above the noise of the velocity, which must be finite")
     return without_short(np.abs(velocity) <= rest, shortest)
 
 

@@ -41,14 +41,7 @@ def swings(time: Numbers, value: Numbers, least: float, band: float = 0.0) -> Sw
     value : (n,), without NaN.
     least : a smaller change is no swing; above the noise.
     band : an error that stays within it in the last fifth has settled; 0 for a signal that is none.
-
-    Raises
-    ------
-    ValueError
-        if `least` is not above zero.
     """
-    if not least > 0.0:
-        raise ValueError(f"least is {least!r}; it must be above zero, above the noise of the signal")
     if band and np.all(np.abs(value[-max(len(value) // 5, 2) :]) <= band):
         return Swings(Verdict.SETTLED)
     rows = turning_points(value, least)
