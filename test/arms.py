@@ -76,7 +76,7 @@ def box(
     rotation: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Obstacles:
     """One box."""
-    return Obstacles(("block",), ("box",), position, rotation, size, (stiffness,), (damping,), (0.0,), (friction,))
+    return Obstacles(("block",), (stiffness,), (damping,), (friction,), ("box",), position, rotation, size, (0.0,))
 
 
 LEVER = 0.9144  # m, the tip of the testbed's 36 in link

@@ -1,4 +1,4 @@
-"""What the arm can move, and what moves by itself: free bodies, doors, moving obstacles."""
+"""What the covers can touch: what all of it has, what the arm can move, and what moves by itself."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,11 +22,38 @@ class Countable:
 
 
 @dataclass(frozen=True)
-class FreeBodies(Countable):
+class Solids:
+    """Solids with a name and a surface that the covers can touch, and with a size; without a shape they are boxes."""
+
+    names: tuple[str, ...] = parameter("name of each")
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0)
+    damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
+
+    def check(self, group: str, shapes: Mapping[str, int] = BOX) -> None:
+        """Refuse lists that are not `named`, and sizes that are not above 0.
+
+        Parameters
+        ----------
+        group : dotted name of the parameter class, for the message.
+        shapes : by name, how many numbers of a size have to be above 0.
+        """
+        named(group, self)
+        for one in rows(self):
+            shape = getattr(one, "shape", "box")
+            needed = one.size[: shapes[shape]]
+            require(
+                all(size > 0.0 for size in needed),
+                f"{one.name}: {group}.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
+                "each must be above 0",
+            )
+
+
+@dataclass(frozen=True)
+class FreeBodies(Solids, Countable):
     """Rigid bodies that lie, slide, roll and tip; they touch covers, obstacles, doors and each other."""
 
     counted_by = "mass"
-    names: tuple[str, ...] = parameter("names of the free bodies")
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(BODY_SHAPES))
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; ball radius, 0, 0",
@@ -41,7 +68,6 @@ class FreeBodies(Countable):
         "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
     )
     mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", high=1e3)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
     ground_friction: tuple[float, ...] = parameter(
         "coefficient of friction against obstacles, doors and other bodies; the larger value of two bodies is used",
         high=10.0,
@@ -52,22 +78,19 @@ class FreeBodies(Countable):
         low=1.0,
     )
     ground_damping: tuple[float, ...] = parameter("damping of each such point", "N s/m", high=1e6)
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
 
     def __post_init__(self) -> None:
-        require_solids("world.bodies", self, BODY_SHAPES)
+        self.check("world.bodies", BODY_SHAPES)
 
 
 @dataclass(frozen=True)
-class Doors(Countable):
+class Doors(Solids, Countable):
     """Flat boxes on a hinge with friction and a spring; they touch covers and free bodies.
 
     The hinge turns about z of a frame at `positions`; at angle 0 the panel reaches along x from there.
     """
 
     counted_by = "mass"
-    names: tuple[str, ...] = parameter("names of the doors")
     positions: tuple[float, ...] = parameter(
         "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
     )
@@ -87,12 +110,9 @@ class Doors(Countable):
     rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", low=-6.3, high=6.3)
     lower: tuple[float, ...] = parameter("smallest angle of the door", "rad", low=-6.3, high=6.3)
     upper: tuple[float, ...] = parameter("largest angle of the door", "rad", low=-6.3, high=6.3)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
 
     def __post_init__(self) -> None:
-        require_solids("world.doors", self)
+        self.check("world.doors")
         for name, low, high in zip(self.names, self.lower, self.upper, strict=True):
             require(
                 low <= 0.0 <= high and low < high,
@@ -137,23 +157,3 @@ def principal_inertia(shape: str, size: Sequence[float], mass: float) -> tuple[f
         return (0.4 * mass * radius,) * 3
     across = mass * (0.25 * radius + size[1] ** 2 / 3.0)
     return across, across, 0.5 * mass * radius
-
-
-def require_solids(group: str, given: Any, shapes: Mapping[str, int] = BOX) -> None:
-    """Refuse lists that are not `named`, and sizes that are not above 0.
-
-    Parameters
-    ----------
-    group : dotted name of the parameter class, for the message.
-    given : solids with a size each and, apart from boxes, a shape.
-    shapes : by name, how many numbers of a size have to be above 0.
-    """
-    named(group, given)
-    for one in rows(given):
-        shape = getattr(one, "shape", "box")
-        needed = one.size[: shapes[shape]]
-        require(
-            all(size > 0.0 for size in needed),
-            f"{one.name}: {group}.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
-            "each must be above 0",
-        )

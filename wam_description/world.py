@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from wam_description.movable import BOX, Countable, Doors, FreeBodies, Motions, require_solids
+from wam_description.movable import BOX, Countable, Doors, FreeBodies, Motions, Solids
 from wam_description.parameters import aligned, empty, parameter, require, rows
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
@@ -11,10 +11,9 @@ NEEDED = {**SHAPES, "plane": 0}  # of these that have to be above 0
 
 
 @dataclass(frozen=True)
-class Obstacles:
+class Obstacles(Solids):
     """Surfaces that the covers can touch, fixed in the base frame."""
 
-    names: tuple[str, ...] = parameter("names of the obstacles")
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
     positions: tuple[float, ...] = parameter(
         "centre in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
@@ -28,15 +27,12 @@ class Obstacles:
         high=100.0,
         width=3,
     )
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", high=1e6)
     hardening: tuple[float, ...] = parameter(
         "h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", high=1e6
     )
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
 
     def __post_init__(self) -> None:
-        require_solids("world.obstacles", self, NEEDED)
+        self.check("world.obstacles", NEEDED)
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ PUSHER_SHAPES = {"sphere": 1, **BOX}
 
 
 @dataclass(frozen=True)
-class Pushers(Countable):
+class Pushers(Solids, Countable):
     """Hands that follow a moving link and press on it: rigid bodies with a soft surface, moved by the simulator.
 
     Each approaches from `clearance`, presses with its force from `begin` to `end` (s since power-up), moves
@@ -72,7 +68,6 @@ class Pushers(Countable):
     """
 
     counted_by = "force"
-    names: tuple[str, ...] = parameter("names of the pushers")
     shapes: tuple[str, ...] = parameter("shape of each; a box presses with its flat side", choices=tuple(PUSHER_SHAPES))
     sizes: tuple[float, ...] = parameter(
         "three numbers each: radius of a sphere, 0, 0; or half lengths of a box along the link, across "
@@ -95,12 +90,9 @@ class Pushers(Countable):
     )
     slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s", low=-10.0, high=10.0)
     turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s", low=-100.0, high=100.0)
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", high=1e6)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the cover", high=10.0)
 
     def __post_init__(self) -> None:
-        require_solids("world.pushers", self, PUSHER_SHAPES)
+        self.check("world.pushers", PUSHER_SHAPES)
         for one in rows(self):
             least = one.begin + 2.0 * one.rise
             require(

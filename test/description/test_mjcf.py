@@ -127,7 +127,7 @@ def test_covers_meet_obstacles_and_nothing_else() -> None:
         ({"stiffness": (0.0,)}, "stiffness"),
         ({"damping": (-1.0,)}, "damping"),
         ({"friction": (float("nan"),)}, "friction"),
-        ({"names": ("block", "post")}, "obstacles.shapes"),
+        ({"names": ("block", "post")}, "obstacles.stiffness"),
         ({"names": ("",)}, "obstacles.names' is ''; give each a name of its own"),
     ],
 )

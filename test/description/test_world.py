@@ -24,7 +24,7 @@ from wam_sim.simulation import Simulation
 G = 9.80665
 STEP = 5e-4
 TABLE = Obstacles(
-    ("table",), ("box",), (0.7, 0.0, -0.6), (0.0,) * 3, (0.5, 0.5, 0.05), (4000.0,), (20.0,), (0.0,), (0.3,)
+    ("table",), (4000.0,), (20.0,), (0.3,), ("box",), (0.7, 0.0, -0.6), (0.0,) * 3, (0.5, 0.5, 0.05), (0.0,)
 )  # its top is at -0.55 m
 
 
@@ -32,8 +32,8 @@ def body(shape: str = "box", **changes: Any) -> FreeBodies:
     """One body of 1.5 kg on the table."""
     size = {"box": (0.05, 0.06, 0.04), "cylinder": (0.05, 0.04, 0.0), "ball": (0.04, 0.0, 0.0)}[shape]
     one = FreeBodies(
-        ("thing",), (shape,), size, (0.7, 0.0, -0.51), (0.0,) * 3, (1.5,), (0.3,), (0.4,), (20000.0,), (50.0,),
-        (4000.0,), (20.0,),
+        ("thing",), (4000.0,), (20.0,), (0.3,), (shape,), size, (0.7, 0.0, -0.51), (0.0,) * 3, (1.5,), (0.4,),
+        (20000.0,), (50.0,),
     )  # fmt: skip
     return dataclasses.replace(one, **changes)
 
@@ -41,8 +41,8 @@ def body(shape: str = "box", **changes: Any) -> FreeBodies:
 def door(**changes: Any) -> Doors:
     """One door of 3 kg, 0.4 m wide, without friction, damping and spring."""
     one = Doors(
-        ("door",), (1.5, 0.0, 0.0), (0.0,) * 3, (0.2, 0.01, 0.3), (3.0,), (0.0,), (0.0,), (0.0,), (0.0,), (-3.0,),
-        (3.0,), (0.3,), (4000.0,), (20.0,),
+        ("door",), (4000.0,), (20.0,), (0.3,), (1.5, 0.0, 0.0), (0.0,) * 3, (0.2, 0.01, 0.3), (3.0,), (0.0,), (0.0,),
+        (0.0,), (0.0,), (-3.0,), (3.0,),
     )  # fmt: skip
     return dataclasses.replace(one, **changes)
 
@@ -272,7 +272,7 @@ def on_the_axis(share: float = 0.5) -> np.ndarray:
 
 def one_obstacle(shape: str, position: np.ndarray, sizes: tuple[float, ...]) -> Obstacles:
     return Obstacles(
-        ("post",), (shape,), tuple(position.tolist()), (0.0,) * 3, sizes, (4000.0,), (20.0,), (0.0,), (0.3,)
+        ("post",), (4000.0,), (20.0,), (0.3,), (shape,), tuple(position.tolist()), (0.0,) * 3, sizes, (0.0,)
     )
 
 

@@ -62,8 +62,8 @@ def squeezed(elbow: float, friction: float) -> tuple[float, list[float]]:
     centre, axis = between(elbow)
     arm = changed(ARM, joints={"start": pose_of(elbow)})
     size, place = (RADIUS, 0.1, 0.0), (tuple(centre.tolist()), roll_pitch_yaw(axis))
-    laws = (MASS,), (friction,), (0.0,), (2e4,), (50.0,), (3e4,), (100.0,)
-    bodies = FreeBodies(("tube",), ("cylinder",), size, *place, *laws)
+    surface, laws = ((3e4,), (100.0,), (friction,)), ((MASS,), (0.0,), (2e4,), (50.0,))
+    bodies = FreeBodies(("tube",), *surface, ("cylinder",), size, *place, *laws)
     plant = Plant(arm, World(NOWHERE, NO_SPRINGS, bodies=bodies), no_effects(arm), STEP)
     plant.brake(False)
     for _ in range(4000):

@@ -228,14 +228,14 @@ def floor(stiffness: float, height: float, damping: float = 0.0, hardening: floa
     turn = (-math.pi / 2.0, 0.0, 0.0)
     one = Obstacles(
         ("floor",),
+        (stiffness,),
+        (damping,),
+        (0.0,),
         ("plane",),
         (0.0, height, 0.0),
         turn,
         (3.0, 3.0, 0.0),
-        (stiffness,),
-        (damping,),
         (hardening,),
-        (0.0,),
     )
     return World(one, NO_SPRINGS)
 
@@ -510,7 +510,7 @@ def test_a_tube_that_bounces_flat_on_a_floor_gains_nothing(seed: int) -> None:
     start = rng.uniform([-0.5, -1.0, -0.3, 0.5], [0.5, 1.0, 0.3, 1.8])
     arm = changed(frictionless(WAM, tuple(start), damping=0.0), joints=WIDE)
     floor = Obstacles(
-        ("floor",), ("plane",), (0.0, 0.0, -0.1), (0.0,) * 3, (3.0, 3.0, 0.0), (4e3,), (0.0,), (0.0,), (0.0,)
+        ("floor",), (4e3,), (0.0,), (0.0,), ("plane",), (0.0, 0.0, -0.1), (0.0,) * 3, (3.0, 3.0, 0.0), (0.0,)
     )
     plant = ideal_plant(arm, floor, FINE)
     plant.brake(False)

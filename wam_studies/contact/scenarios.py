@@ -13,6 +13,7 @@ import numpy as np
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
+from wam_description.parameters import fields
 from wam_description.world import Obstacles
 from wam_studies.contact.moves import MoveGenerator
 from wam_studies.identification.plants import drawn_cover, mismatch
@@ -100,7 +101,7 @@ def dither_values(configuration: Configuration) -> dict[str, Any]:
 def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
     """Values of every scenario: no obstacle within reach, fast moves allowed, the estimator's model as configured."""
     return {
-        **{f"driver:world.obstacles.{key}": [] for key in Obstacles.__dataclass_fields__},
+        **{f"driver:world.obstacles.{field.name}": [] for field in fields(Obstacles)},
         "force_loop:joint_speed_limit": 3.5,
         "contact_estimator:use_joint_sensors": joint_sensors,
         "contact_estimator:observer.mass_scale": [1.0] * len(configuration.shared.arm.joints.names),

@@ -133,8 +133,8 @@ def damped_impact() -> PlantCurve:
     speed, mass, expected = 0.5 * LEVER, link_inertia(arm) / LEVER**2, []
 
     def force(k: float) -> float:
-        law = (k,), (damping,), (0.0,), (0.0,)
-        floor = Obstacles(("floor",), ("plane",), (0.0, 0.0, -0.0254 - below), (0.0,) * 3, (2.0, 2.0, 0.0), *law)
+        law, place = ((k,), (damping,), (0.0,)), ((0.0, 0.0, -0.0254 - below), (0.0,) * 3)
+        floor = Obstacles(("floor",), *law, ("plane",), *place, (2.0, 2.0, 0.0), (0.0,))
         plant = released_plant(arm, World(floor, NO_SPRINGS), RUN_STEP)
         q = -float(np.arcsin(below / LEVER))
         plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), (-7.0, -0.5)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
+from wam_description.parameters import empty
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.plant import Plant
 from wam_theory import cable
@@ -17,7 +18,7 @@ from wam_theory.friction_model import FrictionNode
 Numbers = NDArray[np.float64]
 STEP = 2.5e-4  # s
 IMMOVABLE = 1e9  # kg m^2, of a rotor that the cable cannot accelerate
-NOTHING = Obstacles((), (), (), (), (), (), (), (), ())
+NOTHING = empty(Obstacles)
 EMPTY = World(NOTHING, NO_SPRINGS)
 LEVER = 0.9144  # m, from the joint to the tip
 RATIO = 14.0
