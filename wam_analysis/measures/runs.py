@@ -158,7 +158,7 @@ def noise(value: Numbers) -> float:
     ----------
     value : (n,), at a constant rate.
     """
-    orders = (2, 4, 6, 8)[: (len(value) - 1) // 2]
+    orders = (2, 4, 6, 8)[: max(len(value) - 1, 0) // 2]
     sizes = (float(np.median(np.abs(np.diff(value, m)))) / math.sqrt(math.comb(2 * m, m)) for m in orders)
     return min(sizes, default=0.0) / 0.6745
 
