@@ -92,8 +92,6 @@ def require_sections(sections: Iterable[str], entries: Iterable[str]) -> None:
 def require_parameters(configuration: Configuration) -> None:
     """Refuse sections and values of nodes before any node starts.
 
-    A class of parameters refuses its own; where it has a method `require_fit`, it refuses with the arm.
-
     Raises
     ------
     ParameterError
@@ -105,13 +103,12 @@ def require_parameters(configuration: Configuration) -> None:
         one = declared(entry)
         if one.name in configuration.sections:
             try:
-                own = configuration.node(one.name, one.parameter_class)
+                configuration.node(one.name, one.parameter_class)
             except ParameterError as error:
                 if one.name not in NODES or one.node.__module__.startswith("wam_"):
                     raise
                 shares = f"node '{entry}' has the name and so the parameters of the packaged node '{one.name}'"
                 raise ParameterError(f"{shares}: give it another name; {error}") from error
-            getattr(own, "require_fit", lambda arm: None)(shared.arm)
 
 
 def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:
@@ -255,18 +252,20 @@ class Interface:
 
         The nodes that take them use those of the outer periods alone.
         """
-        work: Callable[[Inputs], Outputs] = getattr(node, reaction.method)
-        outer = [name for name in reaction.outputs if name in self.topics and self.topics[name].rate == "outer"]
-        if not outer or self._is_outer(reaction) or is_packaged(declaration):
+        work: Callable[[Inputs], Any] = getattr(node, reaction.method)
+        if is_packaged(declaration):
             return work
-        timing = self._timing
+        outer = {name for name in reaction.outputs if name in self.topics and self.topics[name].rate == "outer"}
+        is_outer, timing = self._is_outer(reaction), self._timing
 
         def checked(inputs: Inputs) -> Outputs:
             outputs = work(inputs)
-            if not timing.is_outer(inputs.stamp):
-                for name in outer:
-                    if name in outputs:
-                        raise UnusableOutput(declaration.name, name, BETWEEN.format(reaction.trigger.topic))
+            if not isinstance(outputs, Mapping):
+                reason = f"{outputs!r}; return a dictionary from topic to value, which may be empty"
+                raise UnusableOutput(declaration.name, f"output of {reaction.method}", reason)
+            if not is_outer and not timing.is_outer(inputs.stamp):
+                for name in outer & outputs.keys():
+                    raise UnusableOutput(declaration.name, name, BETWEEN.format(reaction.trigger.topic))
             return outputs
 
         return checked

@@ -157,14 +157,13 @@ class RunningArm:
         rows = self.interface.topics
         self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
         for topic, row in rows.items():
-            self._listen_to(row, self._taking(topic))
-
-    def _listen_to(self, row: Topic, take: Callable[[bytes], None]) -> None:
-        name, bus = topic_name(self.node, row), self.context.bus
-        if bus is not None and row.is_numbers and self.context.carries(self.interface.publishers(row.name)):
-            bus.listen(self.node.resolve_topic_name(name), lambda stamp, sent: take(sent.data))
-        else:
-            self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
+            name, take = topic_name(self.node, row), self._taking(topic)
+            if row.is_numbers and self.context.carries(self.interface.publishers(topic)):
+                self.context.bus.listen(
+                    self.node.resolve_topic_name(name), lambda stamp, sent, take=take: take(sent.data)
+                )
+            else:
+                self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 
     def _taking(self, topic: str) -> Callable[[bytes], None]:
         kept = self._recorded.data[topic]
@@ -240,7 +239,7 @@ class RunningArm:
         """
         self._spin(condition, seconds, self._look)
 
-    def _spin(self, condition: Callable[[], Any], seconds: float, look: Callable[[], None]) -> None:
+    def _spin(self, condition: Callable[[], Any], seconds: float, look: Callable[[], None], what: str = "") -> None:
         self._require_start()
         period = self.configuration.shared.timing.outer_period_ns
         limit = self.stamp + seconds * SECOND if self._driver else math.inf
@@ -258,7 +257,7 @@ class RunningArm:
                     waited = f"{seconds:g} s of the arm's time" if stamp > limit else f"{TEST_LIMITS.patience:g} s"
                     q = self.newest("joint_states")
                     at = f"at {stamp / SECOND:.3f} s joint_states is {q and [round(x, 4) for x in q.position]}"
-                    raise AssertionError(f"not met within {waited}: {_source(condition)}; {at}")
+                    raise AssertionError(f"not met within {waited}: {what or _source(condition)}; {at}")
             self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
 
     def run(self, seconds: float) -> None:
@@ -269,14 +268,14 @@ class RunningArm:
 
     def run_until_fault(self, seconds: float = TEST_LIMITS.arm_time) -> str:
         """Spin until the driver has a fault, which the test expects; returns it."""
-        self._spin(self._present_fault, seconds, lambda: None)
+        self._spin(self._present_fault, seconds, lambda: None, "a fault of the driver")
         self.fault = self._present_fault()
         return self.fault
 
     def run_until_refused(self, topic: str, seconds: float = TEST_LIMITS.arm_time) -> str:
         """Spin until a node refuses a message of a topic, which the test expects; returns the node and its reason."""
         self._expected.add(topic)
-        self._spin(lambda: topic in self._refusals(), seconds, self._look)
+        self._spin(lambda: topic in self._refusals(), seconds, self._look, f"that a node refuses {topic}")
         return self._refusals()[topic]
 
     def _refusals(self) -> dict[str, str]:
@@ -301,8 +300,19 @@ class RunningArm:
             raise ArmFault("; ".join(f"{topic} is refused by {why}" for topic, why in unexpected.items()))
 
     def call(self, service: str, switch: bool | None = None) -> Any:
-        """The answer of a service of a node, as ``call("driver/enable", True)``; it has `success` and `message`."""
+        """The answer of a service of a node, as ``call("driver/enable", True)``; it has `success` and `message`.
+
+        Raises
+        ------
+        ValueError
+            where there is no such service, with a switch or without.
+        """
         self._require_start()
+        kind = f"std_srvs/srv/{'Trigger' if switch is None else 'SetBool'}"
+        found = self.node.get_service_names_and_types()
+        there = [name.removeprefix(f"/{NAMESPACE}/") for name, kinds in found if kind in kinds]
+        if service not in there:
+            raise ValueError(f"no {kind} is named '{service}'; there are {', '.join(there)}")
         node, _, name = service.partition("/")
         client, message = self._client.service(Call(node, name, switch))
         self.run_until(client.service_is_ready)

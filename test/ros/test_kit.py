@@ -58,6 +58,13 @@ class Raising(Damping):
         raise ZeroDivisionError
 
 
+class Silent(Raising):
+    name = "silent"
+
+    @reaction(Input("joint_states", "velocity"), outputs=OUTPUTS)
+    def step(self, inputs: Inputs) -> None: ...  # type: ignore[override]
+
+
 class Unread(Raising):
     name, topics = "unread", (Topic("share", JOINT_STATE, "outer", "a share of each joint", "joints"),)
 
@@ -178,6 +185,9 @@ def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
 
 def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     arm.enable()
+    for words in (("driver/estp",), ("estop",), ("driver/estop", True), ("driver/enable",)):
+        with pytest.raises(ValueError, match=f"is named '{words[0]}'; there are .*driver/"):
+            arm.call(*words)
     assert arm.call("driver/estop").success
     with pytest.raises(ArmFault, match="emergency stop"):
         arm.run(0.1)
@@ -198,9 +208,16 @@ def test_a_number_that_is_none_is_an_exception_though_no_node_takes_it(arm: Runn
     arm.run(0.1)
 
 
-def test_a_node_that_raises_is_named(arm: RunningArm) -> None:
-    arm.start(force_loop=Raising)
-    assert arm.run_until_fault().startswith("raising: unexpected ZeroDivisionError")
+@pytest.mark.parametrize(
+    ("node", "text"),
+    [
+        (Raising, "raising: unexpected ZeroDivisionError"),
+        (Silent, "silent: unusable output of step: None; return a dictionary from topic to value"),
+    ],
+)
+def test_a_node_that_fails_is_named(node: type, text: str, arm: RunningArm) -> None:
+    arm.start(force_loop=node)
+    assert arm.run_until_fault().startswith(text)
 
 
 def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) -> None:
@@ -208,6 +225,8 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
         AssertionError, match=r"0\.1 s of .*: arm\.run_until.* \(test_kit\.py:\d+\).* is \[0\.0, -0\.\d+, "
     ):
         arm.run_until(lambda: False, 0.1)
+    with pytest.raises(AssertionError, match=r"0\.1 s of .*: a fault of the driver; "):
+        arm.run_until_fault(0.1)
 
 
 @pytest.mark.parametrize(
