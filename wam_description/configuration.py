@@ -72,7 +72,10 @@ class Configuration(NamedTuple):
         """YAML with these values as ROS reads them: no aliases, and no list of whole and other numbers."""
         tree = {}
         for name, flat in self.sections.items():
-            values = {key: list(map(float, value)) if _is_mixed(value) else value for key, value in flat.items()}
+            mixed = {
+                key for key, value in flat.items() if isinstance(value, list) and {*map(type, value)} == {int, float}
+            }
+            values = {key: list(map(float, value)) if key in mixed else value for key, value in flat.items()}
             tree[name if name == SHARED else f"{SHARED}/{name}"] = {PARAMETERS: nested(values)}
         return yaml_text.dump(tree)
 
@@ -182,8 +185,12 @@ class Configuration(NamedTuple):
         return node
 
     def _build(self, section: str, cls: type[T]) -> T:
+        """Parameters of a section, which their class and its method `require_fit`, if it has one, do not refuse."""
         try:
-            return build(cls, self.sections[section])
+            own = build(cls, self.sections[section])
+            if fit := getattr(own, "require_fit", None):
+                fit(self.shared.arm)
+            return own
         except ParameterError as error:
             where = f"section '{SHARED if section == SHARED else f'/**/{section}'}'"
             given = GIVEN if self._file_is_right(section, cls) else self.path
@@ -192,12 +199,12 @@ class Configuration(NamedTuple):
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:
         """Whether the file itself has usable parameters, or none, so that what was given besides is at fault."""
         try:
-            written = Configuration.load(self.path).sections
-            if section in written:
-                build(cls, written[section])
+            written = Configuration.load(self.path)
+            if section in written.sections and written.sections != self.sections:
+                written._build(section, cls)
         except ParameterError:
             return False
-        return section in written or bool(self.sections[section])
+        return written.sections != self.sections
 
 
 def files_of(path: str | Path) -> list[Path]:
@@ -315,15 +322,12 @@ def packaged_names(kind: str = "configuration") -> list[str]:
     """Names of the configurations, or of the scenarios, that come with the package."""
     wanted = kind == "scenario"
     files = (path for folder in _present_folders() for path in folder.glob("*.yaml"))
-    return sorted({path.stem for path in files if _is_scenario(path) == wanted})
+    scenarios = {path: f"\n{SCENARIO_KEY}" in "\n" + path.read_text(encoding="utf-8") for path in files}
+    return sorted({path.stem for path, is_scenario in scenarios.items() if is_scenario == wanted})
 
 
 def _present_folders() -> list[Path]:
     return [folder for folder in dict.fromkeys(_folders()) if folder.is_dir()]
-
-
-def _is_scenario(path: Path) -> bool:
-    return any(line.startswith(SCENARIO_KEY) for line in path.read_text(encoding="utf-8").splitlines())
 
 
 def _folders() -> Iterator[Path]:
@@ -345,28 +349,18 @@ def _chain(path: Path, above: tuple[Path, ...] = ()) -> list[tuple[Path, Any]]:
     """A file and those that it builds on, its base, the base of that and so on, with their further content."""
     if not path.is_file():
         raise ParameterError(f"configuration {path} is not a file; give the path of a ROS parameter file (YAML)")
-    try:
-        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        raise ParameterError(f"configuration {path} is not a text file: {error}") from error
-    except yaml.YAMLError as error:
-        raise ParameterError(f"{path} is not YAML: {error}") from error
+    tree = yaml_text.read(path, "configuration")
     if not isinstance(tree, dict) or BASE not in tree:
         return [(path, tree)]
-    base = _base(path, tree.pop(BASE), above)
-    return [(path, tree), *_chain(base, (*above, path.resolve()))]
-
-
-def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
-    """The file that an overlay names as its base."""
+    name, above = tree.pop(BASE), (*above, path.resolve())
     if not isinstance(name, str):
         raise ParameterError(
             f"{path}: {BASE} is {name!r}; give the name of a configuration or a path relative to the file"
         )
     base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
-    if base.resolve() in (path.resolve(), *above):
+    if base.resolve() in above:
         raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")
-    return base
+    return [(path, tree), *_chain(base, above)]
 
 
 def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping[str, Any]]:
@@ -410,8 +404,3 @@ def _made(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Configuratio
     return Configuration(
         path, MappingProxyType({name: MappingProxyType(dict(flat)) for name, flat in sections.items()})
     )
-
-
-def _is_mixed(value: Any) -> bool:
-    """Whether a value is a list of whole and other numbers, which ROS refuses."""
-    return isinstance(value, list) and {int, float} == {type(each) for each in value}

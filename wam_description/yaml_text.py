@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Hashable, Mapping
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, TextIO
 
 import yaml
 
-from wam_description.parameters import is_finite, nested
+from wam_description.parameters import ParameterError, is_finite, nested
 from wam_description.thresholds import FILES
 
 OCTAL: Final = re.compile("[-+]?0[0-7_]+")
@@ -49,8 +50,23 @@ for _kind in ("int", "float"):
     _Strict.add_constructor(f"tag:yaml.org,2002:{_kind}", _Strict.construct_decimal)
 
 
-def parse(text: str) -> Any:
-    """The content of a YAML text.
+def read(path: Path, kind: str) -> Any:
+    """The content of a YAML file of a kind.
+
+    Raises
+    ------
+    ParameterError
+        if it is no text, or as for `parse`; names the file.
+    """
+    try:
+        with path.open(encoding="utf-8") as file:
+            return parse(file)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{kind} {path} is not YAML: {error}") from error
+
+
+def parse(text: str | TextIO) -> Any:
+    """The content of a YAML text, or of a file, which an error names.
 
     Raises
     ------
@@ -60,12 +76,14 @@ def parse(text: str) -> Any:
     """
     try:
         _require_plain(text)
+        if not isinstance(text, str):
+            text.seek(0)
         return yaml.load(text, _Strict)  # a safe loader
     except UNREADABLE as error:
         raise yaml.YAMLError(f"one of its values cannot be read: {error}") from error
 
 
-def _require_plain(text: str) -> None:
+def _require_plain(text: str | TextIO) -> None:
     within: list[str | None] = []  # anchors of the mappings and lists around an event
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.CollectionStartEvent):
@@ -100,12 +118,14 @@ def parameter_text(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     """
     tree = {
         node: {
-            "ros__parameters": nested({name: _plain(one) for name, one in sorted(values.items()) if one is not None})
+            "ros__parameters": nested(
+                {
+                    name: one if isinstance(one, (bool, int, float, str)) else list(one)
+                    for name, one in sorted(values.items())
+                    if one is not None
+                }
+            )
         }
         for node, values in sorted(parameters.items())
     }
     return dump(tree)
-
-
-def _plain(value: Any) -> Any:
-    return value if isinstance(value, (bool, int, float, str)) else list(value)

@@ -101,7 +101,10 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("a: [1,", "is not YAML"),
         ("/**: !!map x", "is not YAML: one of its values cannot be read"),
         ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
-        ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
+        (
+            "/**:\n  ros__parameters:\n    a: &a [*a]",
+            r"is not YAML: \*a is inside of what it refers to.*\n  in \".*\.yaml\", line 3",
+        ),
         ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
         (
             "/**:\n  ros__parameters:\n    a: {b: {}, c: 1}",

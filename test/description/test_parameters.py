@@ -3,14 +3,13 @@
 import math
 import os
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from conftest import LONG
+from conftest import LONG, ran
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 
@@ -287,15 +286,8 @@ def test_an_answer_without_a_result_is_no_success() -> None:
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "wam_cli.program", "node", name, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=LONG,
-        check=False,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return ran("-m", "wam_cli.program", "node", name, *arguments, timeout=LONG, cwd=ROOT, env=environment)
 
 
 @pytest.mark.parametrize(

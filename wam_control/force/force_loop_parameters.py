@@ -237,6 +237,8 @@ class ForceLoopParameters:
             self.is_estimated or arm.joint_sensors,
             f"feedback is '{self.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
         )
+        force_law(self)
+        torque_law(self, arm.joints.names)
         springs = {"spring_stiffness": self.spring_stiffness, "spring_rest": self.spring_rest}
         lengths("force_loop", arm.joints.names, springs)
         require(

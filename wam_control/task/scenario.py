@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
-
 from wam_control.force.contact_place import torque_of_position
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.task.motion import GoalMotion, LineMotion, PostureMotion
@@ -437,10 +435,7 @@ def _read(path: str | Path, shared: Shared) -> list[ScenarioStep]:
     path = Path(path)
     if not path.is_file():
         raise ParameterError(f"scenario {path} is not a file; give the path of a YAML file with 'steps'")
-    try:
-        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ParameterError(f"scenario {path} is not YAML: {error}") from error
+    tree = yaml_text.read(path, "scenario")
     if isinstance(tree, dict):
         known(f"scenario {path}", tree, ("steps",), ("steps",))
     if not isinstance(tree, dict) or not isinstance(tree["steps"], list):

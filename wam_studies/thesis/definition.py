@@ -14,7 +14,7 @@ import yaml
 from wam_control.task.scenario_values import known
 from wam_description import yaml_text
 from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError, require
+from wam_description.parameters import require
 
 FOLDER = "experiments"
 TASKS = "tasks"
@@ -101,9 +101,9 @@ def load(name: str) -> Experiment:
         every = [*names(), *tasks()]
         require(name in every, f"no experiment is named '{name}'; choose from {', '.join(every)}")
         path = packaged(f"{TASKS if name in tasks() else FOLDER}/{name}")
-    experiment = _built(str(path), _tree(path), Experiment)
+    experiment = _built(str(path), yaml_text.read(path, "experiment"), Experiment)
     require(bool(experiment.runs), f"{path}: 'runs' must be a list with at least one")
-    sets = [_tree(packaged(f"{SETS}/{included}")) for included in experiment.include]
+    sets = [yaml_text.read(packaged(f"{SETS}/{included}"), "set") for included in experiment.include]
     shared = {key: value for values in (*sets, experiment.values) for key, value in values.items()}
     runs = tuple(_run(f"{path}, run {i + 1}", body, shared) for i, body in enumerate(experiment.runs))
     doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
@@ -168,13 +168,6 @@ def _sample(where: str, body: Any, runs: Sequence[Run]) -> SampleDefinition:
         f"{where}: 'thinned' is {sample.thinned}; give each of some of the topics a number above 0",
     )
     return sample._replace(seconds=(float(seconds[0]), float(seconds[1])), topics=topics)
-
-
-def _tree(path: Path) -> Any:
-    try:
-        return yaml_text.parse(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
-        raise ParameterError(f"{path} is not YAML: {error}") from error
 
 
 def _built(where: str, body: Any, kind: type[T]) -> T:
