@@ -82,6 +82,11 @@ def checked_fields(monkeypatch: pytest.MonkeyPatch) -> None:
             monkeypatch.setattr(module, "ros_python_check_fields", "1")
 
 
+def ran(*words: str, check: bool = False, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Python as another process, when it has ended."""
+    return subprocess.run([sys.executable, *words], capture_output=True, text=True, check=check, **options)
+
+
 def soon() -> float:
     """Seconds that count as prompt: 2, or on a busy machine as long as a few starts of Python with numpy."""
     begin = time.monotonic()

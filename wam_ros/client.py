@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from wam_description.arm import Shared
@@ -22,6 +21,7 @@ from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import Refused, message_type
+from wam_ros.process_signals import held_back
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import Request, answer_of, service_request
 from wam_ros.ros_topics import NAMESPACE, listening, qos
@@ -64,7 +64,9 @@ class StackClient(Closing):
         self.shared: Any = shared
         self.topics = Interface(shared).topics if shared else BY_NAME
         self.client = cache(self.node.create_client)
-        self.publisher = cache(self._make_publisher)
+        self.publisher = cache(
+            lambda topic: self.node.create_publisher(message_type(self.topics[topic]), topic, qos(self.topics[topic]))
+        )
         self._encoder = cache(lambda topic: encoder(self.topics[topic], self.shared))
 
     def close(self) -> None:
@@ -76,7 +78,8 @@ class StackClient(Closing):
 
     def spin_once(self, seconds: float = 0.01) -> None:
         """Handle what comes first within this time."""
-        self.connection.executor.spin_once(timeout_sec=seconds)
+        with held_back():
+            self.connection.executor.spin_once(timeout_sec=seconds)
 
     def wait(self, until: Callable[[], Any], seconds: float = CALL_LIMITS.answer) -> bool:
         """Spin until something is true; False where it is not within this time."""
@@ -273,10 +276,6 @@ class StackClient(Closing):
                 refuse(str(reason))
 
         self.node.create_subscription(message_type(row), topic, receive, listening(row), raw=True)
-
-    def _make_publisher(self, topic: str) -> Publisher:
-        row = self.topics[topic]
-        return self.node.create_publisher(message_type(row), topic, qos(row))
 
     def send(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, as the answer to a state, ns."""

@@ -1,6 +1,6 @@
 """Tests a running driver against its contract (`wam_description.driver_contract`), row by row, over topics.
 
-A check is named as its row, and returns what is wrong, '' where nothing is.
+A check is named as its row, and returns what is wrong, '' where nothing is, or raises it.
 """
 
 import math
@@ -106,8 +106,7 @@ def _velocity(bench: DriverBench) -> str:
 
 def _braked(bench: DriverBench) -> str:
     bench.brake()
-    if wrong := bench.in_mode("braked"):
-        return wrong
+    bench.in_mode("braked")
     bench.watch()
     bench.forget()
     bench.watch()
@@ -195,8 +194,7 @@ def _repetition(bench: DriverBench) -> str:
 def _fault(bench: DriverBench) -> str:
     bench.enable()
     bench.ask("estop")
-    if wrong := bench.in_mode("fault"):
-        return wrong
+    bench.in_mode("fault")
     fault = bench.status.fault
     if not fault or bench.status.level is not Level.ERROR:
         return f"status has the fault '{fault}' and the level {bench.status.level.name}"
@@ -247,8 +245,7 @@ def _peers(bench: DriverBench) -> str:
     fault = "tested by wam conform"
     bench.enable()
     bench.report(fault)
-    if wrong := bench.in_mode("fault"):
-        return wrong
+    bench.in_mode("fault")
     named = [(event.values.get("node"), event.values.get("fault")) for event in bench.status.events]
     if ("velocity_loop", fault) not in named:
         return f"no event of its status names velocity_loop and its fault, '{fault}': {named}"
@@ -349,24 +346,24 @@ def conformance_row(bench: DriverBench, key: str, attempts: int) -> ConformanceR
 
     One in which the test itself was held up does not count, and proves nothing.
     """
-    row = ConformanceRow(key, NOT_TESTED)
+    verdict, found = NOT_TESTED, ""
     left, held_up, pause = attempts, CONFORMANCE_LIMITS.held_up * attempts, 0.0
     while left and held_up:
         bench.longest_pause = 0.0
         try:
             found = CHECKS[key](bench)
-            row = ConformanceRow(key, WRONG if found else OK, found)
+            verdict = WRONG if found else OK
         except Wrong as reason:
-            row = ConformanceRow(key, WRONG, str(reason))
+            verdict, found = WRONG, str(reason)
         except Untested as reason:
-            row = ConformanceRow(key, NOT_TESTED, str(reason))
+            verdict, found = NOT_TESTED, str(reason)
         finally:
             bench.be_proper()
-        if row.verdict == OK or key in ONCE:
+        if verdict == OK or key in ONCE:
             break
         pause = bench.longest_pause
         left, held_up = (left, held_up - 1) if pause > CONFORMANCE_LIMITS.pause else (left - 1, held_up)
-    if row.verdict != OK and not held_up:
-        late = f"this computer delayed the test itself, last by {1e3 * pause:.0f} ms"
-        row = ConformanceRow(key, NOT_TESTED, f"{row.found} ({late})")
-    return row
+    if verdict != OK and not held_up:
+        verdict = NOT_TESTED
+        found = f"{found} (this computer delayed the test itself, last by {1e3 * pause:.0f} ms)"
+    return ConformanceRow(key, verdict, found)

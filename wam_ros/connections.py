@@ -146,14 +146,12 @@ class StackNode(TolerantNode):
             self.take_status(status)
 
     def _look_for_peers(self) -> None:
-        interface = self.interface
-        for name, subscription in self.inlets.subscriptions.items():
-            if subscription.get_publisher_count() < len(interface.publishers(name)):
-                return
-        for name, count in self.outlets.subscriptions().items():
-            if count < len(interface.subscribers(name)):
-                return
-        if not self.is_waiting():
+        publishers, subscribers = self.interface.publishers, self.interface.subscribers
+        found = self.inlets.subscriptions.items()
+        is_lacking = any(one.get_publisher_count() < len(publishers(name)) for name, one in found) or any(
+            count < len(subscribers(name)) for name, count in self.outlets.subscriptions().items()
+        )
+        if not is_lacking and not self.is_waiting():
             self._readiness.cancel()
             self.health.is_ready = True
             self.report_ready()

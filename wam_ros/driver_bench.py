@@ -279,10 +279,10 @@ class DriverBench(StackClient):
         return ""
 
     def in_mode(self, mode: str) -> str:
-        """What is wrong with the mode, '' where it is this one."""
-        if self.wait(lambda: self.status.mode == mode, REPLY):
-            return ""
-        return f"status.mode is '{self.status.mode}'; it has to be '{mode}'"
+        """'' where the mode is this one; raises Wrong where it is not."""
+        if not self.wait(lambda: self.status.mode == mode, REPLY):
+            raise Wrong(f"status.mode is '{self.status.mode}'; it has to be '{mode}'")
+        return ""
 
     def compare(self) -> str:
         """What is wrong with the currents that flow, against those commanded."""

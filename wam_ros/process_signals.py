@@ -12,6 +12,7 @@ then: brakes on, bag closed.
 
 import os
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
@@ -49,15 +50,35 @@ def ignore_signals() -> None:
 
 
 class Stop:
-    """Set by `SIGNALS`; the context stays alive, so that nodes can report that they end."""
+    """Set by `SIGNALS`; the context stays alive, so that nodes can report that they end.
+
+    Attributes
+    ----------
+    code : exit code of a program whose work the signal has cut short, 128 + number; 0 before.
+    """
 
     def __init__(self) -> None:
-        self.is_set = False
+        self.is_set, self.code = False, 0
         for number in SIGNALS:
             signal.signal(number, self._take)
 
     def _take(self, number: int, frame: object) -> None:
-        self.is_set = True
+        self.is_set, self.code = True, 128 + number
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """`SIGNALS` are handled at its end: an exception in a callback would be a failure that the executor reports."""
+    came: list[int] = []
+    numbers = SIGNALS if threading.current_thread() is threading.main_thread() else []  # no other thread handles them
+    before = {number: signal.signal(number, lambda number, frame: came.append(number)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if came:
+        signal.raise_signal(came[0])
 
 
 @contextmanager

@@ -153,15 +153,13 @@ class _Channel:
         if found is None:
             if len(self.publishers) >= RECORDER_LIMITS.publishers:
                 self.publishers.popitem(last=False)
-            found = self.publishers[publisher] = Numbering(partial(self._writers_of, publisher))
+            found = self.publishers[publisher] = Numbering(
+                lambda: [writer for writer, node in self._writers().items() if node == publisher]
+            )
             for node, total in self.totals.items():
                 if found in self._numberings(node):
                     found.announce(total)
         return found
-
-    def _writers_of(self, publisher: str) -> list[str]:
-        """Identities of a publisher's writers of the topic at present."""
-        return [writer for writer, node in self._writers().items() if node == publisher]
 
 
 class Recorder:

@@ -74,19 +74,25 @@ class RecorderNode(StackNode):
             self._drain()
         self._tapes.remove(self._keep)
         self.inlets.close()
-        self._close()
+        self._attach_parameters()
+        unfinished = sorted(self._unfinished)
+        self.recorder.finish(unfinished)
+        counts = self.recorder.summary(unfinished)
+        if self.recorder.failure:
+            lost = f"{self.recorder.lost_at_disk} of the received messages are not in the bag"
+            self.get_logger().error(f"{self.recorder.failure}; {lost}; received: {counts} on the way")
+        elif self.recorder.total("lost_at_end") or unfinished:
+            self.get_logger().warning(f"{self.bag.path}: {counts}")
+        else:
+            self.get_logger().info(f"{self.bag.path}: {counts}")
         super(StackNode, self).destroy_node()  # nobody waits for its last report
 
     @property
     def failure(self) -> str:
         """Why the bag is incomplete or has wrong times, '' if neither."""
-        return self.recorder.failure or self.stack.failure or self._empty
-
-    @property
-    def _empty(self) -> str:
-        """That no message of the stack has come to a recorder that was started by hand; '' where one has."""
-        if self._ends_last or any(count.publisher != RECORDER for count in self.recorder.counts()):
-            return ""
+        failure = self.recorder.failure or self.stack.failure
+        if failure or self._ends_last or any(count.publisher != RECORDER for count in self.recorder.counts()):
+            return failure
         return f"{self.bag.path} is empty: no message came; start the stack with 'wam up' before the recorder"
 
     def raise_priority(self) -> None:
@@ -191,19 +197,6 @@ class RecorderNode(StackNode):
         text = parameter_text(parameters)
         if text != self._attached and self.recorder.attach("parameters.yaml", "application/yaml", text.encode()):
             self._attached = text
-
-    def _close(self) -> None:
-        self._attach_parameters()
-        unfinished = sorted(self._unfinished)
-        self.recorder.finish(unfinished)
-        counts = self.recorder.summary(unfinished)
-        if self.recorder.failure:
-            lost = f"{self.recorder.lost_at_disk} of the received messages are not in the bag"
-            self.get_logger().error(f"{self.recorder.failure}; {lost}; received: {counts} on the way")
-        elif self.recorder.total("lost_at_end") or unfinished:
-            self.get_logger().warning(f"{self.bag.path}: {counts}")
-        else:
-            self.get_logger().info(f"{self.bag.path}: {counts}")
 
 
 class RecordedStack:

@@ -16,7 +16,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -43,15 +42,6 @@ def die_with_parent() -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != int(parent):
         raise SystemExit("error: the program that started this node is gone")
-
-
-def make_executor(context: Context) -> Any:
-    """Events executor where this rclpy has it, the single-threaded one elsewhere."""
-    try:
-        from rclpy.experimental import EventsExecutor
-    except ImportError:
-        return SingleThreadedExecutor(context=context)
-    return EventsExecutor(context=context)
 
 
 class StackContext(Context):
@@ -131,7 +121,11 @@ class Connection(Closing):
             domain_id=domain_id,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self.executor = make_executor(self.context)
+        try:  # an events executor where this rclpy has it
+            from rclpy.experimental import EventsExecutor as Executor
+        except ImportError:
+            from rclpy.executors import SingleThreadedExecutor as Executor
+        self.executor: Any = Executor(context=self.context)
         self.listener_gone = False
         self.nodes: dict[str, Any] = {}
         self._nodes: list[Node] = []

@@ -113,9 +113,9 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     workers : number; None for one per core.
     """
     count = workers or os.cpu_count() or 1
+    # workers inherit the mask: only this process handles what a terminal sends to all of them, Ctrl-C or its own end
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_worker)
-    # workers inherit the mask: only this process handles a Ctrl-C of the terminal, which goes to all of them
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     for _ in range(count):
         pool.submit(os.getpid)
     signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -30,7 +30,6 @@ def record(
     configuration: Configuration,
     steps: Sequence[ScenarioStep],
     path: Path,
-    namespace: str = "wam",
     report: Callable[[float, str], None] = lambda seconds, step: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> str:
@@ -43,7 +42,6 @@ def record(
     configuration : of the nodes.
     steps : the scenario.
     path : of the bag, a new directory.
-    namespace : of the recorded topics.
     report : called with the arm's time, s, and the name of each step that begins.
     is_stopped : ends the recording once it is true.
 
@@ -60,9 +58,9 @@ def record(
     configuration = configuration.with_nodes(SCENARIO)  # it is simulated in any case
     simulation = Simulation(configuration, steps)
     with BagWriter(path) as bag:
-        recording = _Recording(bag, simulation, namespace)
+        recording = _Recording(bag, simulation)
         simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), SCENARIO)
-        bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration, namespace).encode())
+        bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration).encode())
         recording.watch_driver()
         while not is_stopped() and not simulation.step():
             recording.watch_driver()
@@ -75,9 +73,9 @@ def record(
 class _Recording:
     """Writes what a simulation publishes."""
 
-    def __init__(self, bag: BagWriter, simulation: Simulation, namespace: str) -> None:
+    def __init__(self, bag: BagWriter, simulation: Simulation) -> None:
         shared = simulation.configuration.shared
-        self._bag, self._simulation, self._arm, self._namespace = bag, simulation, shared.arm, namespace
+        self._bag, self._simulation, self._arm = bag, simulation, shared.arm
         self._counts: Counter[tuple[str, str]] = Counter()
         self._driver: NodeStatus | None = None
         interface = Interface(shared)
@@ -110,7 +108,7 @@ class _Recording:
         return found
 
     def _full(self, topic: str) -> str:
-        return topic if topic.startswith("/") else f"/{self._namespace}/{topic}"
+        return topic if topic.startswith("/") else f"/wam/{topic}"
 
     def _write_value(self, topic: str, encode: Encode, sender: str, stamp: int, value: Any) -> None:
         self._write(topic, encode(stamp, value), stamp, sender)
@@ -127,8 +125,8 @@ class _Recording:
         self._bag.write(name, data, stamp, stamp, self._counts[name, sender])
 
 
-def _parameters(configuration: Configuration, namespace: str) -> str:
+def _parameters(configuration: Configuration) -> str:
     nodes = {declared(entry).name for entry in configuration.shared.nodes}
     own = {name: flat for name, flat in configuration.sections.items() if name in nodes}
     shared = configuration.sections[SHARED]
-    return parameter_text({f"/{namespace}/{name}": {**shared, **flat} for name, flat in own.items()})
+    return parameter_text({f"/wam/{name}": {**shared, **flat} for name, flat in own.items()})

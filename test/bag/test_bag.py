@@ -4,8 +4,6 @@ import contextlib
 import os
 import shutil
 import struct
-import subprocess
-import sys
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from bag_comparison import compare
+from conftest import ran
 from mcap.reader import make_reader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
@@ -225,12 +224,6 @@ def test_bags_are_read_without_the_rest_of_the_project(tmp_path: Path) -> None:
         "assert len(bag.read(sys.argv[1]).topics) == 6; repair.repair(repair.Path(sys.argv[1])); "
         "print(*sorted({name.split('.')[0] for name in sys.modules if name.startswith(('wam_', 'rclpy'))}))"
     )
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", program, str(tmp_path / "sample")],
-        env={**os.environ, "PYTHONPATH": str(tmp_path / "alone")},
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "alone")}
+    done = ran("-P", "-c", program, str(tmp_path / "sample"), env=environment, cwd=tmp_path)
     assert (done.stderr, done.stdout.split()) == ("", ["wam_bag"])

@@ -199,13 +199,12 @@ def test_every_command_and_each_of_its_requests_has_a_help(command: str, capsys:
         assert (code, err, out.startswith(f"usage: wam {' '.join(words)} ")) == (0, "", True), words
 
 
-def test_the_help_is_one_screen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_help_is_one_screen_and_fits_a_narrow_one(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     assert len(COMMANDS) == 15
     assert said(capsys, "--help")[1].count("\n") <= 30
-
-
-def test_the_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     for words in [[], *([name] for name in COMMANDS)]:
         out = said(capsys, *words, "--help")[1]

@@ -12,6 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from conftest import ran
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from simulation import installed
@@ -187,13 +188,6 @@ def test_the_package_is_compiled_where_that_is_possible(
         (tmp_path / path.name).symlink_to(path)
     path = str(Path(shutil.which(COMPILER) or "").parent) if is_there else str(tmp_path)
     environment = {**os.environ, "PATH": path, "WAM_COMPILE": wanted, "PYTHONPATH": ""}
-    done = subprocess.run(
-        [sys.executable, "-c", LIST_EXTENSIONS],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = ran("-c", LIST_EXTENSIONS, check=True, cwd=tmp_path, env=environment)
     found = int(done.stdout.rpartition("extensions: ")[2])
     assert found == count if count is not None else found > 1

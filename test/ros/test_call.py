@@ -127,6 +127,16 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
     assert lacks.startswith("no service /wam/driver/nosuch; there are /wam/driver/enable, ")
 
 
+def test_a_signal_is_handled_between_two_callbacks(domain_id: int, capfd: pytest.CaptureFixture[str]) -> None:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with StackClient("wam") as client:
+        client.node.create_timer(0.001, lambda: signal.raise_signal(signal.SIGTERM))
+        with pytest.raises(KeyboardInterrupt):
+            client.wait(lambda: False)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    assert "Exception" not in capfd.readouterr().err
+
+
 def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another_node(
     ros: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,10 +1,9 @@
 """Priority: what is reported is what the system has granted, to every thread but the one that sends later."""
 
 import os
-import subprocess
-import sys
 
 import pytest
+from conftest import ran
 
 OWN = f"{{{os.getpriority(os.PRIO_PROCESS, 0)}}}"  # niceness of the tests, which a started program inherits
 PROGRAM = """
@@ -52,13 +51,8 @@ print((os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == (before[
 
 def told(fifo: int, niceness: int, permitted: bool = True) -> tuple[str, ...]:
     """What a process reports; whether its threads have FIFO, their niceness, that of its session."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(fifo), str(niceness), str(int(permitted))],
-        capture_output=True,
-        text=True,
-        check=True,
-        start_new_session=True,
-    )
+    words = (str(number) for number in (fifo, niceness, int(permitted)))
+    done = ran("-c", PROGRAM, *words, check=True, start_new_session=True)
     return tuple(done.stdout.splitlines())
 
 
@@ -84,13 +78,7 @@ def test_without_permission_everything_is_as_usual() -> None:
 
 @pytest.mark.parametrize("used", [1.6, 1.8])
 def test_a_process_that_takes_a_whole_processor_gives_its_priority_back(used: float) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", GIVEN_BACK, str(used)],
-        capture_output=True,
-        text=True,
-        check=True,
-        start_new_session=True,
-    )
+    done = ran("-c", GIVEN_BACK, str(used), check=True, start_new_session=True)
     granted, looks, is_usual = done.stdout.splitlines()
     gives_back = granted != "usual" and used > 1.7
     assert looks == f"False {gives_back} {'usual' if gives_back or granted == 'usual' else granted}"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import LONG, soon, wait
+from conftest import LONG, ran, soon, wait
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool
 
@@ -254,12 +254,13 @@ def main_without_exit(*words: str) -> None:
     assert ended.value.code == 0
 
 
-def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_lockstep_that_never_pauses(number: int, started: Any, tmp_path: Path, domain_id: int) -> None:
     stack = started("-m", "wam_cli.main", "demo", "--no-live", "--real-time-factor", "0", "--name", "stopped")
     wait(lambda: recorded(stack) > 100_000, f"a bag that grows; {stack.said()}")
-    stack.process.send_signal(signal.SIGINT)
+    stack.process.send_signal(number)
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
-    assert stack.process.returncode == 130
+    assert stack.process.returncode == 128 + number
     assert "Traceback" not in stack.said()
     assert statuses(tmp_path, "driver")[-1] == "braked"
 
@@ -379,6 +380,14 @@ def test_a_reader_who_has_had_enough_is_no_error() -> None:
     )
     os.close(write)
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_stream_that_the_caller_has_closed_is_no_error(closed: str) -> None:
+    words = ["sh", "-c", f"{sys.executable} -m wam_cli.program model scorecard {closed}"]
+    done = subprocess.run(words, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize(
@@ -561,13 +570,7 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
 def test_a_node_without_a_package_that_it_needs_ends_with_one_line(tmp_path: Path, domain_id: int) -> None:
     (tmp_path / "pinocchio.py").write_text("raise ModuleNotFoundError('gone', name='pinocchio')")
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "wam_cli.program", "node", "driver"],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran("-P", "-m", "wam_cli.program", "node", "driver", env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 1
     assert done.stderr.startswith("wam node: it needs 'pinocchio', which is not installed; ")
     assert len(done.stderr.splitlines()) == 1

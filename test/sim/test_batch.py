@@ -212,14 +212,16 @@ def piece(n):
     return n
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
+    for number in (signal.SIGINT, signal.SIGHUP):  # the first is ignored where the tests run in the background
+        signal.signal(number, signal.default_int_handler)
     with batch.processes(2) as executor:
         batch.results(piece, range(1000), executor, Path("kept.jsonl"), lambda done, of: Path(f"report.{done}").touch())
 """
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(number: int, tmp_path: Path) -> None:
     (tmp_path / "slow.py").write_text(SLOW)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
@@ -230,7 +232,7 @@ def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) 
                 (tmp_path / "report.1").exists() and (tmp_path / "began.1").exists()
             ):  # one worker works, one waits
                 assert process.poll() is None
-            os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+            os.killpg(process.pid, number)  # as a terminal does
             _, errors = process.communicate(timeout=LONG)  # the piece would take ten minutes
         finally:
             if process.poll() is None:

@@ -2,10 +2,10 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from conftest import ran
 
 from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
 from wam_control.task.scenario import Push, ScenarioStep
@@ -36,14 +36,7 @@ def without_ros(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         code = f"raise ModuleNotFoundError(\"No module named '{name}'\", name='{name}')"
         (folder / "hidden" / name / "__init__.py").write_text(code)
     path = os.pathsep.join([str(folder / "hidden"), str(ROOT)])
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "wam_cli.program", *words],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return ran("-P", "-m", "wam_cli.program", *words, cwd=folder, env={**os.environ, "PYTHONPATH": path})
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
 EXIT_CODES = (
     "Exit code: 0 if the run was complete and every result is right; 1 if the run failed or a result is NO (with "
-    "--task: MISSED); 130 if you stopped it."
+    "--task: MISSED); 128 + the number of the signal if you stopped it, so 130 after Ctrl-C."
 )
 PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
 WITHOUT_ROS = (
@@ -88,7 +88,7 @@ def run(given: argparse.Namespace) -> int:
     failures, stopped = play(configuration, steps, bag, given)
     if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
-        return 130
+        return stopped
     unmet, bag_word = stoppable_report(bag, bool(failures), task), shlex.quote(str(bag))
     if failures or unmet is None:
         stream = sys.stderr if unmet is None else sys.stdout  # that of the report
@@ -173,8 +173,8 @@ def _report_of_task(task: Experiment, bag: Path, found: Any) -> tuple[str, tuple
 
 def play(
     configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
-) -> tuple[list[str], bool]:
-    """Play the scenario of a configuration and record it into a bag; why that failed, and whether somebody stopped it.
+) -> tuple[list[str], int]:
+    """Play the scenario of a configuration and record it into a bag; why that failed, and the code of who stopped it.
 
     Raises
     ------
@@ -186,31 +186,23 @@ def play(
         import rclpy  # noqa: F401 - whether there is ROS
     except ModuleNotFoundError:
         return _simulated(configuration, steps, bag, given)
-    return _with_nodes(configuration, given)
-
-
-def _simulated(
-    configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
-) -> tuple[list[str], bool]:
-    if processes_of(configuration, given) != ONE or given.live:
-        option = "--live" if given.live else "--processes" if given.processes else "--realtime"
-        raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
-    print(WITHOUT_ROS, flush=True)
-    stop = Stop()
-    failure = record(configuration, steps, bag, report=_stated, is_stopped=lambda: stop.is_set)
-    if failure:
-        print(f"error: {failure}", file=sys.stderr, flush=True)
-    return [failure] * bool(failure), stop.is_set
-
-
-def _stated(seconds: float, step: str) -> None:
-    print(f"{seconds:5.1f} s  {step}", flush=True)
-
-
-def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> tuple[list[str], bool]:
     from wam_cli.commands.up import run_nodes
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
     stop = Stop()
     ended = run_nodes(configuration, given, stop)
-    return [*filter(None, (*ended.failures, ended.failure))], stop.is_set
+    return [*filter(None, (*ended.failures, ended.failure))], stop.code
+
+
+def _simulated(
+    configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
+) -> tuple[list[str], int]:
+    if processes_of(configuration, given) != ONE or given.live:
+        option = "--live" if given.live else "--processes" if given.processes else "--realtime"
+        raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
+    print(WITHOUT_ROS, flush=True)
+    stop, stated = Stop(), lambda seconds, step: print(f"{seconds:5.1f} s  {step}", flush=True)
+    failure = record(configuration, steps, bag, report=stated, is_stopped=lambda: stop.is_set)
+    if failure:
+        print(f"error: {failure}", file=sys.stderr, flush=True)
+    return [failure] * bool(failure), stop.code

@@ -81,7 +81,7 @@ def run(given: argparse.Namespace) -> int:
     if given.excite is not None:
         bag = _excite(configuration, given)
         if bag is None:
-            return 0 if given.only_write else 130
+            return 0
     run_in_bag = recorded_run(read(bag, TOPICS, may_lack=True), given.namespace or "")
     if run_in_bag.others:
         print(f"{run_in_bag.others}\n", flush=True)
@@ -105,7 +105,10 @@ def run(given: argparse.Namespace) -> int:
         )
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
-        write_overlay(given.write, _base(given), values, command)
+        folder, base = given.write.resolve().parent, given.config
+        if base.endswith(YAML_SUFFIXES):
+            base = os.path.relpath(Path(base).resolve(), folder)
+        write_overlay(given.write, base, values, command)
         print(
             f"written: {given.write}; use it with --config {given.write}, or as `base` of a configuration of your own"
         )
@@ -137,16 +140,8 @@ def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
         )
 
 
-def _base(given: argparse.Namespace) -> str:
-    """The present configuration as the overlay names it."""
-    name: str = given.config
-    if not name.endswith(YAML_SUFFIXES):
-        return name
-    return os.path.relpath(Path(name).resolve(), given.write.resolve().parent)
-
-
 def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | None:
-    """Write the scenario and play it; the bag, None where it was not played to its end."""
+    """Write the scenario and play it; the bag, None with --only-write."""
     seconds, seed = given.seconds or 60.0, 1 if given.seed is None else given.seed
     text = yaml.safe_dump(scenario(configuration, seed, seconds), sort_keys=False, default_flow_style=None)
     command = f"wam identify --excite {shlex.quote(str(given.excite))} --seed {seed} --seconds {seconds:g}"
@@ -168,4 +163,6 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     )
     if failure:
         raise ValueError(f"the motion failed: {failure}")
-    return None if stop.is_set else bag
+    if stop.is_set:
+        raise SystemExit(stop.code)
+    return bag
