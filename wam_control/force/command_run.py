@@ -218,14 +218,14 @@ class CommandRun:
 
         Torques that a payload explains are not.  Of others, those above a limit, N m, are.
         """
-        axis = self.axes[0].now if self.axes else None
-        if self._is_decided or axis is None or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
+        axis = self.axes[0].now
+        if self._is_decided or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
             return
         self._is_decided, torques = True, self.resting
         if measurement.payload(torques, float(measurement.torques.sd.max())):
             return
         force = axis.force(torques)
-        if axis.sensed is not None and axis.place is not None and float(np.abs(torques).max()) <= limit:
+        if axis.place is not None and float(np.abs(torques).max()) <= limit:
             sensed = forces.axis(q, axis.place, axis.direction, abs(force))
             if force <= 0.0 or sensed.unexplained(torques) > FORCE.unexplained:
                 return
