@@ -94,8 +94,8 @@ def sawtooth(phase: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shape", ["sine", "sawtooth", "square"])
-@pytest.mark.parametrize("period", [0.0931, 0.5, 1.37])
-def test_a_planted_cycle_is_recovered_from_noise_and_drift(shape, period):
+@pytest.mark.parametrize(("period", "hum"), [(0.0931, 0.0), (0.5, 0.0), (1.37, 0.0), (1.37, 0.1)])
+def test_a_planted_cycle_is_recovered_from_noise_drift_and_hum(shape, period, hum):
     time = np.arange(6000) / 1000.0
     phase = time / period + 0.3
     wave = {
@@ -103,7 +103,7 @@ def test_a_planted_cycle_is_recovered_from_noise_and_drift(shape, period):
         "sawtooth": sawtooth(phase),
         "square": 0.5 * np.sign(np.sin(2 * math.pi * phase)),
     }
-    value = 7.0 + 0.2 * time + 1.6 * wave[shape] + draws(3, len(time), 0.05)
+    value = 7.0 + 0.2 * time + 1.6 * wave[shape] + draws(3, len(time), 0.05) + hum * np.sin(294.67 * time)
     found = limit_cycle(time, value)
     assert found.period == near(period)
     assert found.peak_to_peak == PRECISE(1.6, rel=0.02)

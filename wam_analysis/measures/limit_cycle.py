@@ -101,6 +101,8 @@ def _period(flat: Numbers) -> float:
     """Lag of the first of the highest peaks of the autocorrelation, in samples; NaN for none.
 
     The peaks of a fast cycle are between the samples: a peak is as high as the cosine through it and its neighbours.
+    A faster cycle on top makes many peaks of one: it is the highest of those that are nearer to the first than to
+    its double.
     """
     n = len(flat)
     size = 1 << (2 * n - 1).bit_length()
@@ -112,15 +114,17 @@ def _period(flat: Numbers) -> float:
         return math.nan
     first = int(negative[0])
     three = likeness[np.arange(first, longest - 1) + np.arange(3)[:, None]]
-    peaks = np.flatnonzero((three[1] >= three[0]) & (three[1] > three[2]) & (three[1] > 0.0))
+    before, peak, after = three
+    peaks = np.flatnonzero((peak >= before) & (peak > after) & (before + after > -2.0 * peak))
     if not len(peaks):
         return math.nan
     before, peak, after = three[:, peaks]
-    turn = np.clip(0.5 * (before + after) / peak, -1.0, 1.0)
+    turn = 0.5 * (before + after) / peak
     heights = np.hypot(peak, 0.5 * (after - before) / np.sqrt(np.maximum(1.0 - turn**2, 1e-300)))
-    row = int(peaks[heights >= CYCLE.correlated * np.max(heights)][0])
-    low, top, high = three[:, row].tolist()
-    return first + 1 + row + 0.5 * (low - high) / (low - 2.0 * top + high)  # where the parabola through them is highest
+    lags = first + 1 + peaks
+    high = np.flatnonzero(heights >= CYCLE.correlated * np.max(heights))
+    high = high[2 * lags[high] < 3 * lags[high[0]]]
+    return top(likeness, int(lags[high[np.argmax(heights[high])]]))
 
 
 def _refined(flat: Numbers, lag: float) -> float:
@@ -133,6 +137,12 @@ def _refined(flat: Numbers, lag: float) -> float:
     slope = float(np.polynomial.polynomial.polyfit(np.arange(len(phase)), phase, 1)[1])
     found = 1.0 / (1.0 / lag + slope / (2.0 * math.pi))
     return found if abs(found / lag - 1.0) < CYCLE.same_period else lag
+
+
+def top(values: Numbers, row: int) -> float:
+    """Where the parabola through a sample and its two neighbours is highest."""
+    a, b, c = values[row - 1 : row + 2].tolist()
+    return row + 0.5 * (a - c) / (a - 2.0 * b + c)
 
 
 class _Folded(NamedTuple):
@@ -151,8 +161,8 @@ def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
     shape = np.interp(np.arange(phases), known, shape[known], period=phases)
     rest = float(np.sum((flat - shape[cell]) ** 2)) / max(len(flat) - len(known), 1)
     whole = float(np.sum((flat - np.mean(flat)) ** 2)) / max(len(flat) - 1, 1)
-    scatter = math.sqrt(min(rest, noise(flat) ** 2) / max(len(flat) / phases, 1.0))
-    size = float(np.ptp(shape)) - _luck(np.max(shape) - shape, scatter) - _luck(shape - np.min(shape), scatter)
+    scatter, seen = math.sqrt(min(rest, noise(flat) ** 2) * len(known) / len(flat)), shape[known]
+    size = float(np.ptp(seen)) - _luck(np.max(seen) - seen, scatter) - _luck(seen - np.min(seen), scatter)
     return _Folded(shape, max(size, 0.0), max(0.0, 1.0 - rest / whole) if whole > 0.0 else 0.0)
 
 

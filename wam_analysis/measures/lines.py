@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.measures.limit_cycle import top
 from wam_analysis.thresholds import CYCLE
 from wam_bag.arrays import Numbers
 
@@ -35,6 +36,7 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) ->
         return []
     even, flat, window = np.linspace(time[0], time[-1], n), *_windowed(value)
     amplitude = 4.0 * np.abs(np.fft.rfft(flat)) / n
+    levels = np.log(np.maximum(amplitude, 1e-300))
     power, spacing = amplitude**2, (n - 1) / (n * float(time[-1] - time[0]))
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
@@ -44,11 +46,9 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) ->
         is_clear = not found or (len(found) < most and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
         if k < CYCLE.first_line or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
             continue
-        if power[k] < sure * max(_nearest(power, k), _noise(power, k)):
+        if power[k] < sure * max(_nearest(power, k), _noise(levels, k)):
             continue
-        a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
-        shift = 0.5 * (a - c) / (a - 2.0 * b + c)
-        frequency = (k + shift) * spacing
+        frequency = top(levels, k) * spacing
         back = np.exp(-2j * np.pi * frequency * even)
         kept = np.interp(even, stamps, np.exp(2j * np.pi * frequency * stamps))
         found.append(SpectralLine(frequency, 2.0 * float(np.abs(np.sum(flat * back) / np.sum(window * kept * back)))))
@@ -69,9 +69,10 @@ def _nearest(power: Numbers, k: int) -> float:
     return float(np.mean(np.concatenate((power[max(k - 4, 1) : k - 2], power[k + 3 : k + 5]))))
 
 
-def _noise(power: Numbers, k: int) -> float:
-    """Level of the noise at a bin: of a line through the logarithms of power and frequency of its neighbours."""
-    reach = min(max(k // 2, CYCLE.neighbours[0]), CYCLE.neighbours[1])
-    rows = np.r_[max(k - reach, 1) : k - 2, k + 3 : min(k + reach + 1, len(power))]
-    line = np.polynomial.polynomial.polyfit(np.log(rows / k), np.log(np.maximum(power[rows], 1e-300)), 1)
+def _noise(levels: Numbers, k: int) -> float:
+    """Power of the noise at a bin: of a line through the logarithms of amplitude and frequency of its neighbours."""
+    least, most = CYCLE.neighbours
+    reach = min(max(k // 2, least), most)
+    rows = np.r_[max(k - reach, 1) : k - 2, k + 3 : min(k + reach + 1, len(levels))]
+    line = np.polynomial.polynomial.polyfit(np.log(rows / k), 2.0 * levels[rows], 1)
     return math.exp(float(line[0]) + CYCLE.euler_gamma)
