@@ -42,7 +42,6 @@ class ShaftThresholds:
     # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
     jump: float = 6.0
     unsure: float = 0.25  # of a number; with a larger standard error it is not identifiable
-    below_zero: float = 3.0  # standard errors: a number so negative shows more than friction
     hidden: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
     much_better: float = 0.5  # of the rest of a fit: one with a lag leaves less
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
@@ -77,7 +76,7 @@ class CycleThresholds:
     episode_cycles: int = 5  # cycles of an episode; fewer repeat by chance in one of many windows
     window_samples: int = 64  # samples of a window, at least
     slowest_cycles: int = 4  # cycles in a window, slower changes are drift when a cycle is looked for
-    same_period: float = 0.05  # relative difference of two periods that are the same
+    same_period: float = 0.05  # relative difference of two periods, or frequencies, that are the same
     # of its size: the second half of a limit cycle that follows a decaying motion has so much of the first
     steady: float = 0.95
     edge: float = 1.5  # cycles at an end within the recording that are not evaluated: it is not known better
@@ -89,7 +88,6 @@ class CycleThresholds:
     loud_swing: float = 8.0  # standard deviations of the noise: likewise
     still_shaft: float = 1e-4  # rad; a shaft that moves less does not swing
     loud: float = 4.0  # standard deviations of the noise: a smaller cycle is not reported
-    same_frequency: float = 0.03  # relative difference of two frequencies that are the same
     commanded: float = 0.2  # of a cycle: a command that is smaller does not cause it
     longest_lag: float = 0.15  # s by which a joint may follow its command
     lags: int = 40  # steps of that lag at most
@@ -103,7 +101,7 @@ class CycleThresholds:
     # lines of a spectrum
     first_line: int = 5  # lowest frequency, in 1/duration: below it a drift is no line
     # bins on each side at least and at most, half of the frequency, from which the noise is known
-    neighbours: tuple[int, ...] = (8, 24)
+    neighbours: tuple[int, int] = (8, 24)
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
     sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
     apart: int = 4  # times higher or lower frequencies, between which a line is reported if it is the strongest
@@ -199,7 +197,6 @@ class IdentificationThresholds:
     heavier: float = 1.4  # weight, or torque, per configured one, that no configured arm is wrong by
     least_share: float = 0.05  # of the configured friction, below which none is left
     misfit: float = 0.15  # rms of the recorded torques beyond those of the configured arm, per torque
-    better: float = 0.5  # of that, what a mistake leaves that explains it
     poses: int = 100  # random ones, in which the columns of parameters are compared
     seed: int = 1  # of these poses
 
@@ -225,7 +222,6 @@ class StreamThresholds:
     usual: float = 0.01  # s from message to message, by which the unit of stamps is guessed
     latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
     seconds: float = 1e18  # a time below this is in seconds or less, above it in ns since 1970
-    absent: float = 1.5  # periods between two messages of a frame, from which one is absent
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
@@ -262,8 +258,7 @@ class ReportLayout:
     name: float = 0.4  # width of a name in a table at most, of all
     column: int = 12  # width of a number in a table at least, columns
     stated: int = 3  # sentences of a line of the verdict
-    changes: int = 4  # of parameters that are named
-    begins: int = 5  # of motions that are named
+    named: int = 5  # changes of parameters, or motions
     # pictures
     points: int = 6000  # points of a line
     digits: int = 6  # of a number

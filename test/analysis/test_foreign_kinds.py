@@ -285,16 +285,14 @@ def in_steps(frequency: float, size: float, step: float) -> list[Sent]:
 
 
 def still() -> list[Case]:
-    def with_flicker(write: Any, seed: int, count: float, noise: float) -> Case:
+    def with_flicker(write: Any, seed: int, count: float, noise: float, often: float = 0.03) -> Case:
         drawn = np.random.default_rng(seed)
         time = np.cumsum(drawn.choice([0.008, 0.01], 3000))
-        _, w = 0.0, 2.0 * math.pi * 0.3
-        a, speed = 0.5 * np.sin(w * time), 0.5 * w * np.cos(w * time)
-        b = 1.2 + count * np.where(drawn.random(3000) < 0.03, drawn.choice([-1, 1], 3000), 0)
-        position = np.column_stack([a, b])
-        velocity = np.column_stack([speed, noise * drawn.normal(size=3000)])
-        noise_of_effort = 0.01 * drawn.normal(size=3000)
-        effort = np.column_stack([DRY * np.sign(speed) + VISCOUS * speed + noise_of_effort, 0.2 + 0.0 * time])
+        a, speed = 0.5 * np.sin(0.6 * math.pi * time), 0.3 * math.pi * np.cos(0.6 * math.pi * time)
+        b = 1.2 + count * np.where(drawn.random(3000) < often, drawn.choice([-1, 1], 3000), 0)
+        position, velocity = np.column_stack([a, b]), np.column_stack([speed, noise * drawn.normal(size=3000)])
+        acting = DRY * np.sign(speed) + VISCOUS * speed + 0.01 * drawn.normal(size=3000)
+        effort = np.column_stack([acting, 0.2 + 0.0 * time])
         sent = joints("/joint_states", time, ["a", "b"], position=position, velocity=velocity, effort=effort)
         return Case(f"{count:g}, {noise:g}", write, sent, FRICTION, "", NOTHING, ("b: never moved.",))
 
@@ -304,6 +302,9 @@ def still() -> list[Case]:
         with_flicker(by_rosbags, 1, 1e-4, 0.0),
         with_flicker(sqlite, 2, 1e-3, 1e-4),
         with_flicker(ros1, 3, 2e-5, 1e-3),
+        with_flicker(sqlite, 4, 1.9e-3, 0.0, 0.003),
+        Case("a belt", ros1, joints("/s", np.arange(600) / 50.0, ["a"], position=0.02 * np.arange(600)[:, None]),
+             {}, "", NOTHING, ("a: always in motion",)),
         Case("noise", by_rosbags,
              joints("/s", range(2000), ["a"], position=1e-3 * np.random.default_rng(11).normal(size=(2000, 1))),
              {}, "", NOTHING, ("a: never moved.",)),
@@ -485,9 +486,11 @@ def other_units() -> list[Case]:
     alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
     often = [[s._replace(fields={"name": [name], "position": s.fields["position"]})
               for s in one("/joint_states", 100.0, 0.7, 20.0)] for name in ("motor1", "left_wheel")]  # fmt: skip
+    metres = topic_map([], [], [], [], ["position=m"])
     two, in_degrees = "one of the two has another unit", "if its position is in deg, give --unit position=deg"
     return [
         Case("position alone", by_rosbags, alone, {}, in_degrees, NOTHING, ()),
+        Case("linear", sqlite, slow, FRICTION, "", metres, ("N, viscous", "N s/m")),
         *(Case("a motor's shaft and a wheel may turn often and fast", by_rosbags, sent, {}) for sent in often),
         scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),
         scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "mm/s (shown in m/s", "rpm (shown in rad/s"),

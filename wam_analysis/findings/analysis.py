@@ -10,7 +10,7 @@ import numpy as np
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.efficiency import efficiency_section
 from wam_analysis.findings.effort import effort_section
-from wam_analysis.findings.finding import Section, counted, shown, stated
+from wam_analysis.findings.finding import Section, counted, deviations, shown, stated
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.force_steps import step_section
 from wam_analysis.findings.friction import friction_section
@@ -107,19 +107,22 @@ def analyse(
         return analyse_bag(bag, progress, given=given)
     path = Path(source)
     progress(f"reading {path}")
-    found = None if path.suffix.lower() in (".csv", ".tsv", ".txt") else read(path, ())
-    if found is not None and not any(found.counts.values()):
-        raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
-    if found is not None and not any(given) and _is_own(found):
-        return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
+    is_table = path.suffix.lower() in (".csv", ".tsv", ".txt")
+    if not is_table:
+        found = read(path, ())
+        if not any(found.counts.values()):
+            raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
+        if not any(given) and _is_own(found):
+            return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
     if namespace:
         raise ValueError(
             f"--namespace chooses an arm of this stack, but {path} is a recording of another robot; leave it out"
         )
-    if found is not None:
+    if is_table:
+        bag, given = table_bag(path, series_of_csv(path), given)
+    else:
         progress("as a recording of another robot")
-        return analyse_bag(foreign_bag(found, given), progress, given=given)
-    bag, given = table_bag(path, series_of_csv(path), given)
+        bag = foreign_bag(found, given)
     return analyse_bag(bag, progress, given=given)
 
 
@@ -175,10 +178,14 @@ def analyse_bag(
 
 
 def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Section:
-    """Three lines: what the recording is, what is wrong with it, what it shows."""
+    """Three lines: what the recording is, what is wrong with it, what it shows, first what was not predicted."""
     what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
     wrong = [(sentence, section.title) for section in sections for sentence in section.wrong]
-    shows = [(sentence, section.title) for section in sections for sentence in section.shows]
+    shows = [
+        (sentence, section.title)
+        for section in sorted(sections, key=lambda section: not deviations(section.findings))
+        for sentence in section.shows
+    ]
     shows = shows or [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
     lines = (
         _line("Problems", wrong, "none found."),
@@ -245,7 +252,7 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
     if not changes:
         return
     statuses, named = run.stamped_statuses(), list[str]()
-    for i, (stamp, key, before, value) in enumerate(changes[: LAYOUT.changes], 1):
+    for i, (stamp, key, before, value) in enumerate(changes[: LAYOUT.named], 1):
         end = next((later for later, other, *_ in changes[i:] if other == key), math.inf)
         lowered = _lowered(statuses, key, stamp, end)
         named.append(f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s{lowered}")

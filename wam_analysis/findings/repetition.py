@@ -45,7 +45,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
         unit, command = one.units[quantity], recording.command_of(one)
         own = None if command is None else command.only(quantity if quantity in command.values else "velocity")
         for piece in pieces(one, quantity):
-            least = max(CYCLE.loud * piece.noise[quantity], LEAST.get(unit, 0.0))
+            least = max(CYCLE.loud * piece.noise[quantity], LEAST[unit])
             for found in _of_piece(piece, quantity, own, least):
                 begin, end, cycle = found.episode
                 name = label if label not in taken else f"{label} from {begin:.1f} s"
@@ -82,7 +82,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         unit = one.units[quantity]
         for line in spectral_lines(piece.time, piece.values[quantity], piece.stamps, CYCLE.lines):
             begins.append(line.frequency)
-            if 2.0 * line.amplitude > LEAST.get(unit, 0.0):
+            if 2.0 * line.amplitude > LEAST[unit]:
                 name = f"{label}, {shown(line.frequency, 'Hz')}"
                 findings.append(Finding(f"{name}: amplitude", unit, line.amplitude))
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
@@ -117,7 +117,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         frequency = _commanded_frequency(one, quantity, command)
         if frequency is None:
             result.append(FoundCycle(one, UNKNOWN))
-        elif abs(frequency * one.cycle.period - 1.0) > CYCLE.same_frequency:
+        elif abs(frequency * one.cycle.period - 1.0) > CYCLE.same_period:
             if rest is None:
                 result.append(FoundCycle(one, LIMIT_CYCLE))
         else:
@@ -127,7 +127,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
     rate = 1.0 / max(float(np.median(np.diff(command.time))), STREAM.quickest) if len(command.time) > 1 else 0.0
     for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
-        if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_frequency:
+        if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_period:
             continue  # the commanded motion itself, which it does not follow linearly, or the steps of its messages
         order = 1.0 / (one.cycle.period * frequency) if frequency > 0.0 else math.inf
         is_harmonic = order <= 0.5 + CYCLE.harmonics and abs(order - round(order)) <= CYCLE.near_harmonic
@@ -192,7 +192,7 @@ def is_known(command: Source, time: Numbers) -> bool:
     Of two topics that begin at once either may have the first message.
     """
     period = float(np.median(np.diff(command.time))) if len(command.time) >= SHAFT.fewest_samples else 0.0
-    return bool(command.time[0] <= time[0] + STREAM.absent * period) and not np.any(command.is_away(time))
+    return bool(command.time[0] <= time[0] + STREAM.changes * period) and not np.any(command.is_away(time))
 
 
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:

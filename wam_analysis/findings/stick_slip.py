@@ -39,8 +39,8 @@ def stick_section(recording: AnalysedRecording) -> Section:
         ]
         sentence = f"{one.label}: {found.words}"
         if recording.is_foreign and found.stuck and found.begins:  # ours have the arm's time
-            begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.begins]]
-            begins += ["..."] * (len(found.begins) > LAYOUT.begins)
+            begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.named]]
+            begins += ["..."] * (len(found.begins) > LAYOUT.named)
             sentence += f" (from {', '.join(begins)} s)"
             if found.slowest:
                 sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"

@@ -292,7 +292,7 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     is_seldom = is_command and np.count_nonzero(most) < SHAFT.fewest_samples
     rows = np.flatnonzero(most)
     steps, has_others = np.diff(time[rows]), np.diff(rows) > 1  # besides others: they go on at their period
-    if not is_seldom and np.any(has_others) and np.median(steps[has_others]) < STREAM.absent * np.median(steps):
+    if not is_seldom and np.any(has_others) and np.median(steps[has_others]) < STREAM.changes * np.median(steps):
         return [(frame, mask, mask) for frame, mask in masks.items()]
     every = np.ones(len(frames), dtype=bool)
     if isinstance(columns, JointColumns) or len(masks) == 1:
@@ -367,23 +367,21 @@ def _treated(one: Source) -> Source:
             values["position"] = position
             treated.append(Treated(Treatment.WRAPPED, "position", wraps, size=turn))
     measured = {} if one.is_command else values
-    shown = one._replace(values=values).only("position", "velocity")
-    moves = _jumps(shown) if "position" in measured else np.zeros(len(shown.time))
-    back = shown.time[:-1][moves[:-1] * moves[1:] < 0.0]
+    at, moves = _jumps(one._replace(values=measured))
+    back = at[:-1][moves[:-1] * moves[1:] < 0.0]
     for quantity, value in measured.items():
         # a zero that would move and move back is a single sample, too
-        rows = row_at(one.time, back) if quantity == "position" and len(back) else _spikes(value)
+        least = SHAFT.joint_rest * (quantity == "position")
+        rows = row_at(one.time, back) if least and len(back) else _spikes(value, least)
         if len(rows):
             mean, values[quantity] = 0.5 * (value[rows - 1] + value[rows + 1]), value.copy()
             values[quantity][rows] = mean
             size = np.max(np.abs(value[rows] - mean))
             treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
-    if "position" in measured:
-        shown = one._replace(values=values).only("position", "velocity")
-        moves = _jumps(shown)  # again, without the spikes
-        if len(sizes := moves[moves != 0.0]):
-            values["position"] = values["position"] - np.cumsum(moves)[row_at(shown.time, one.time)]
-            treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
+    at, moves = _jumps(one._replace(values=measured))  # again, without the spikes
+    if len(sizes := moves[moves != 0.0]):
+        values["position"] = values["position"] - np.cumsum(moves)[row_at(at, one.time)]
+        treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
     factor, unfit = velocity_fit(one._replace(values=values))
     if unfit and not one.is_command:
         del values["velocity"]
@@ -392,8 +390,8 @@ def _treated(one: Source) -> Source:
     return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
 
 
-def _spikes(value: Numbers) -> Index:
-    """Rows of single samples away from both neighbours, by more than all others extend over."""
+def _spikes(value: Numbers, least: float) -> Index:
+    """Rows of single samples away from both neighbours, by more than all others extend over, and a least way."""
     value = np.where(np.isfinite(value), value, math.nan)
     steps = np.diff(value)
     there, back = steps[:-1], -steps[1:]
@@ -402,7 +400,7 @@ def _spikes(value: Numbers) -> Index:
         return np.zeros(0, np.int64)
     ends = STREAM.repeated, 1.0 - STREAM.repeated
     reach = np.ptp(np.nanquantile(value, ends))
-    return np.flatnonzero(away > max(reach, STREAM.zero * np.quantile(away, ends[1]))) + 1
+    return np.flatnonzero(away > max(reach, least, STREAM.zero * np.quantile(away, ends[1]))) + 1
 
 
 def _held_over(value: Numbers) -> Mask:
@@ -463,10 +461,14 @@ def _moved(time: Numbers, velocity: Numbers) -> Numbers:
     return 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)
 
 
-def _jumps(shown: Source) -> Numbers:
-    """By how much the zero of the position moved before each message, (n,): by what the velocity does not explain."""
+def _jumps(one: Source) -> tuple[Numbers, Numbers]:
+    """Times, s, and by how much the zero of the position moved before each: by what the velocity does not explain."""
+    shown = one.only("position", "velocity")
+    if "position" not in shown.values:
+        return np.zeros(0), np.zeros(0)
     velocity = shown.values.get("velocity", np.zeros(1))
-    return jumps(shown.time, shown.values["position"], SHAFT.joint_rest, velocity if np.any(velocity) else None)
+    found = jumps(shown.time, shown.values["position"], SHAFT.joint_rest, velocity if np.any(velocity) else None)
+    return shown.time, found
 
 
 def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None = None) -> Numbers:
@@ -552,16 +554,20 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
 
 
 def resolution(value: Numbers) -> float:
-    """Standard deviation of the noise of a signal, or of its rounding to the steps of an encoder."""
-    steps = np.abs(np.diff(value))
-    steps = steps[steps > 0.0]
-    if not len(steps):
+    """Standard deviation of the noise of a signal, or of its rounding to the steps of an encoder.
+
+    What moves by the same in every sample shows no rounding.
+    """
+    steps = np.diff(value)
+    sizes = np.abs(steps[steps != 0.0])
+    if not len(sizes):
         return 0.0
-    quantum = float(np.min(steps))
-    counts = steps / quantum
+    quantum = float(np.min(sizes))
+    counts = sizes / quantum
     # from place to place, to stay there, as a gripper does: no flicker of an encoder
-    is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(np.diff(value)) < np.std(value)
-    is_rounded = not is_step and np.all(np.abs(counts - np.rint(counts)) < 0.05) and np.median(counts) < 1e3
+    is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(steps) < np.std(value)
+    is_even = is_step or np.ptp(steps) < 0.5 * quantum
+    is_rounded = not is_even and np.all(np.abs(counts - np.rint(counts)) < 0.05) and np.median(counts) < 1e3
     return max(noise(value), quantum / math.sqrt(12.0) if is_rounded else 0.0)
 
 

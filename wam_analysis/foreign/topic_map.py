@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-QUANTITIES = {  # units that are shown, that of ROS first
+QUANTITIES = {  # units that are shown: that of ROS, of linear joints, others
     "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"), "force": ("N",),
     "torque": ("N m",), "stamp": ("s",),
 }  # fmt: skip
@@ -44,8 +44,9 @@ class TopicMap(NamedTuple):
     units: Mapping[str, tuple[float, str]] = {}
 
     def scaled(self, quantity: str) -> tuple[float, str]:
-        """Factor and shown unit of a quantity."""
-        return self.units.get(quantity, (1.0, QUANTITIES[quantity][0]))
+        """Factor and shown unit of a quantity; where positions are in m, the other units are of linear joints, too."""
+        is_linear = "m" in self.units.get("position", ())
+        return self.units.get(quantity, (1.0, QUANTITIES[quantity][: 1 + is_linear][-1]))
 
 
 NOTHING_GIVEN = TopicMap()

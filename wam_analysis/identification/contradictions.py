@@ -15,7 +15,7 @@ from wam_analysis.identification.fit import Identification, rms
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.unknowns import Unknowns
-from wam_analysis.thresholds import IDENTIFY
+from wam_analysis.thresholds import IDENTIFY, SHAFT
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
 
@@ -96,7 +96,7 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
         mistake = Contradiction(Mistake.SWAPPED, tuple(motors[i] for i in pair), 1.0)
         tried.append((_misfit(*_torques(shared, unknowns, _swapped(motion, *pair))), mistake))
     least, cause = min(tried, key=lambda one: one[0])
-    is_clear = as_recorded > IDENTIFY.misfit and least < IDENTIFY.better * as_recorded
+    is_clear = as_recorded > IDENTIFY.misfit and least < SHAFT.much_better * as_recorded
     return cause if is_clear else None
 
 

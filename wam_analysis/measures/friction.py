@@ -29,7 +29,7 @@ class FrictionNumber(NamedTuple):
     @property
     def is_negative(self) -> bool:
         """Whether it is surely below zero: then the torque holds more than friction."""
-        return self.value < -SHAFT.below_zero * self.error
+        return self.value < -SHAFT.sigmas * self.error
 
 
 UNKNOWN = FrictionNumber()
