@@ -73,7 +73,7 @@ class CycleThresholds:
     correlated: float = 0.9
     sure: float = 0.8  # confidence from which a limit cycle is reported as one
     seen: float = 0.02  # of the force; a smaller cycle is not reported
-    episode_cycles: int = 5  # cycles of an episode; fewer repeat by chance in one of many windows
+    episode_cycles: int = 5  # cycles of an episode or a line; fewer repeat by chance, or are of a drift
     window_samples: int = 64  # samples of a window, at least
     slowest_cycles: int = 4  # cycles in a window, slower changes are drift when a cycle is looked for
     same_period: float = 0.05  # relative difference of two periods, or frequencies, that are the same
@@ -99,7 +99,6 @@ class CycleThresholds:
     # of a size: a cycle whose second half has less of the first, or more, is reported as changing
     changing: float = 0.9
     # lines of a spectrum
-    first_line: int = 5  # lowest frequency, in 1/duration: below it a drift is no line
     # bins on each side at least and at most, half of the frequency, from which the noise is known
     neighbours: tuple[int, int] = (8, 24)
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
@@ -222,7 +221,6 @@ class StreamThresholds:
     usual: float = 0.01  # s from message to message, by which the unit of stamps is guessed
     latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
     seconds: float = 1e18  # a time below this is in seconds or less, above it in ns since 1970
-    alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
     exact: int = 1000  # ns: waits that differ by less are one
@@ -239,7 +237,7 @@ class StreamThresholds:
     wraps: float = 0.75  # of the range of a counter: by more it jumps where it begins again
     alike: float = 3.0  # times the largest other step: in a wrap an angle moves by less than that
     within: float = 1.01  # of a turn, which an angle that wraps does not leave
-    zero: float = 5.0  # times what the velocity usually leaves of a step of the position: more may move its zero
+    zero: float = 5.0  # times the usual change, or what the velocity leaves of it: more is a jump
     beyond: float = 2.0  # times the largest step by the velocity: a larger one does
     around: int = 2  # steps on each side that show the velocity where none was recorded
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate

@@ -121,7 +121,6 @@ def analyse(
     if is_table:
         bag, given = table_bag(path, series_of_csv(path), given)
     else:
-        progress("as a recording of another robot")
         bag = foreign_bag(found, given)
     return analyse_bag(bag, progress, given=given)
 
@@ -187,11 +186,8 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
         for sentence in section.shows
     ]
     shows = shows or [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
-    lines = (
-        _line("Problems", wrong, "none found."),
-        _line("Shows", shows, "nothing that can be evaluated."),
-    )
-    return Section("verdict", "Verdict", (what, *lines))
+    problems = _line("Problems", wrong, "none found.")
+    return Section("verdict", "Verdict", (what, problems, _line("Shows", shows, "nothing that can be evaluated.")))
 
 
 def _line(title: str, found: list[tuple[str, str]], silent: str) -> str:
@@ -205,9 +201,11 @@ def _line(title: str, found: list[tuple[str, str]], silent: str) -> str:
 
 def _foreign_line(recording: AnalysedRecording) -> str:
     """What another robot's recording is."""
-    joints = {one.name for one in recording.sources if one.is_joint}
-    wrenches = {one.topic for one in recording.sources if not one.is_joint}
-    held = [counted(len(joints), "joint"), *([counted(len(wrenches), "wrench topic")] if wrenches else [])]
+    found = {
+        "joint": {one.name for one in recording.sources if one.is_joint},
+        "wrench topic": {one.topic for one in recording.sources if not one.is_joint},
+    }
+    held = [counted(len(those), what) for what, those in found.items() if those]
     unused = [title for title, kind in recording.bag.types.items() if kind == UNUSED]
     line = f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
     return f"{line} Not used: {'; '.join(unused)}; rename those that you need: {RENAMED}." if unused else line

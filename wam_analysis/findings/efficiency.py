@@ -36,8 +36,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
         findings.append(Finding("efficiency, motors to links", "%", 100.0 * got / put, 100.0 * expected, note))
         sentences.append(f"While driving, the motors put {shown(put, 'J')} into the transmission.")
     if put_back > SHAFT.least_work:
-        back = 100.0 * got_back / put_back
-        findings.append(Finding("efficiency, links to motors", "%", back, note="backdriven"))
+        findings.append(Finding("efficiency, links to motors", "%", 100.0 * got_back / put_back, note="backdriven"))
         sentences.append(f"The links, by their weight or a push, put {shown(put_back, 'J')} into it.")
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
@@ -48,8 +47,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
 def _losses(signals: TransmissionSignals, with_joints: bool) -> Numbers:
     """Power lost to friction and creep by the configured parameters, (k,), W: up to the cables, or with the joints."""
     shafts = (signals.arm.motors, signals.velocity), (signals.arm.joints, np.nan_to_num(signals.joint_velocity))
-    every = shafts[: 1 + with_joints]
-    loss = sum(np.abs(v) @ one.dynamic_friction + v**2 @ one.viscous_friction for one, v in every)
+    loss = sum(np.abs(v) @ one.dynamic_friction + v**2 @ one.viscous_friction for one, v in shafts[: 1 + with_joints])
     creep = [circuit.loss_per_torque for circuit in signals.arm.circuits]
     return loss + signals.load**2 * np.abs(signals.velocity) @ np.array(creep)
 

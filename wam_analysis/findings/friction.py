@@ -14,7 +14,6 @@ from wam_description.parts import Joints, Motors
 from wam_description.transmission_map import TransmissionMap
 
 UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
-ONE_WAY = "measured in one direction only, includes any offset"
 MORE = "record different motions, slow and fast, in both directions, over a turn or more of the motors"
 
 
@@ -63,7 +62,7 @@ def _friction_findings(name: str, found: Friction, configured: Numbers, note: st
     """Of one shaft."""
     about = {"static": f"{found.breakaways} breakaways"}
     if math.isnan(found.offset) and math.isfinite(found.dynamic.value):
-        about["dynamic"] = ONE_WAY
+        about["dynamic"] = "measured in one direction only, includes any offset"
     findings = []
     for (kind, unit), predicted in zip(UNITS.items(), configured.tolist(), strict=True):
         doubt, known = "", getattr(found, kind)

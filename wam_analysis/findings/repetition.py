@@ -78,7 +78,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     for one, quantity, label in traced(recording.states):
         if (piece := max(pieces(one, quantity), key=lambda part: len(part.time), default=None)) is None:
             continue
-        begins.append(CYCLE.first_line / float(np.ptp(piece.time)))
+        begins.append(CYCLE.episode_cycles / float(np.ptp(piece.time)))
         unit = one.units[quantity]
         for line in spectral_lines(piece.time, piece.values[quantity], piece.stamps, CYCLE.lines):
             begins.append(line.frequency)

@@ -89,8 +89,8 @@ def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
         if _lacks_velocity(one) and "position" not in given.units and not turns_often(one.name):
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
             if (most := float(max(speeds, default=0.0))) > UNUSUAL["velocity"]:
-                fast = f"moves at up to {shown(most, 'rad/s')}"
-                yield f"{one.label}: {fast}; if its position is in deg, give --unit position=deg."
+                why = "if its position is in deg, give --unit position=deg"
+                yield f"{one.label}: moves at up to {shown(most, 'rad/s')}; {why}."
 
 
 def turns_often(name: str) -> bool:

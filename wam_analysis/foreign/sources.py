@@ -197,14 +197,12 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 one = timed.get(of_sender.tobytes()) or _timed(clock, received, columns, of_sender)
                 timed[of_sender.tobytes()] = one
                 mine = (own & known if is_command or not name else own)[one.rows]
-                rows, seconds = one.rows[mine], one.time[mine]
+                rows = one.rows[mine]
                 taken = {q: v[rows] for q, v in values.items() if np.isfinite(v[rows]).any()}
                 units = {q: given.scaled(q.partition(".")[0])[1] for q in (JOINT_FIELDS if name else AXES)}
                 away = np.unique(clock[sent & ~own] / 1e9)
-                arrived = received[one.rows] / 1e9
-                source = Source(
-                    topic, topic, name, frame, is_command, seconds, one.time, arrived, away, taken, units, one.treated
-                )
+                times = one.time[mine], one.time, received[one.rows] / 1e9
+                source = Source(topic, topic, name, frame, is_command, *times, away, taken, units, one.treated)
                 if np.count_nonzero(known[rows]) >= (1 if is_command else SHAFT.fewest_samples):
                     found.append(_treated(source))
     return _labelled(found)
@@ -320,9 +318,9 @@ def alternates(source: Source) -> bool:
         finest = max(
             float(np.median(twice)),
             float(np.min(twice, initial=math.inf, where=twice > 0.0)) if np.any(twice) else 0.0,
-            CYCLE.still_shaft / STREAM.alternates if quantity == "position" else 0.0,
+            CYCLE.still_shaft / STREAM.zero if quantity == "position" else 0.0,
         )
-        away = once > STREAM.alternates * np.maximum(np.maximum(*near), np.maximum(twice, finest))
+        away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, finest))
         if np.mean(away) > (STREAM.repeated / 2.0 if quantity == "position" else 0.5):
             return True
     return False
@@ -467,8 +465,8 @@ def _jumps(one: Source) -> tuple[Numbers, Numbers]:
     if "position" not in shown.values:
         return np.zeros(0), np.zeros(0)
     velocity = shown.values.get("velocity", np.zeros(1))
-    found = jumps(shown.time, shown.values["position"], SHAFT.joint_rest, velocity if np.any(velocity) else None)
-    return shown.time, found
+    known = velocity if np.any(velocity) else None
+    return shown.time, jumps(shown.time, shown.values["position"], SHAFT.joint_rest, known)
 
 
 def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None = None) -> Numbers:

@@ -44,7 +44,7 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) ->
     found: list[SpectralLine] = []
     for k in peaks[np.argsort(-power[peaks])].tolist():
         is_clear = not found or (len(found) < most and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
-        if k < CYCLE.first_line or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
+        if k < CYCLE.episode_cycles or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
             continue
         if power[k] < sure * max(_nearest(power, k), _noise(levels, k)):
             continue
