@@ -486,11 +486,10 @@ def other_units() -> list[Case]:
     alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
     often = [[s._replace(fields={"name": [name], "position": s.fields["position"]})
               for s in one("/joint_states", 100.0, 0.7, 20.0)] for name in ("motor1", "left_wheel")]  # fmt: skip
-    metres = topic_map([], [], [], [], ["position=m"])
     two, in_degrees = "one of the two has another unit", "if its position is in deg, give --unit position=deg"
     return [
         Case("position alone", by_rosbags, alone, {}, in_degrees, NOTHING, ()),
-        Case("linear", sqlite, slow, FRICTION, "", metres, ("N, viscous", "N s/m")),
+        Case("linear", sqlite, slow, FRICTION, "", topic_map([], [], [], [], ["position=m"]), ("N, viscous", "N s/m")),
         *(Case("a motor's shaft and a wheel may turn often and fast", by_rosbags, sent, {}) for sent in often),
         scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),
         scaled("velocity", degree, sqlite, two, "deg/s (shown in rad/s", "mm/s (shown in m/s", "rpm (shown in rad/s"),

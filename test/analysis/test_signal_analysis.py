@@ -287,8 +287,7 @@ def test_efficiency_is_work_out_over_work_in_both_ways():
     motor = np.sin(time)
     joint = np.where(motor > 0.0, 0.93 * motor, motor / 0.8)
     (put, got), (put_back, got_back) = works(time, motor, joint), works(time, -joint, -motor)
-    assert got / put == near(0.93)
-    assert got_back / put_back == near(0.8)
+    assert (got / put, got_back / put_back) == (near(0.93), near(0.8))
     assert put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
 
 
