@@ -7,6 +7,7 @@ import itertools
 import linecache
 import math
 import os
+import struct
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -184,14 +185,18 @@ class RunningArm:
     @property
     def stamp(self) -> int:
         """The arm's time, ns."""
-        self._require_start()
-        return int(self._driver.stamp)
+        return int(self._simulator.stamp)
 
     @property
     def truth(self) -> Any:
         """The simulated arm, a `wam_driver.plant.Plant`: `q`, `qd`, `loads()` and so on, which no sensor reports."""
+        return self._simulator.plant
+
+    @property
+    def _simulator(self) -> Any:
         self._require_start()
-        return self._driver.plant
+        assert self._driver is not None, "this test has no driver, so no arm and no time: use run_until"
+        return self._driver
 
     @property
     def recorded(self) -> Recorded:
@@ -383,7 +388,10 @@ class RunningArm:
     def _stream(self, stamp: int, only: str = "") -> None:
         for topic, (end, value) in list(self._streams.items()):
             if only in ("", topic):
-                self._client.send(topic, stamp, value)
+                try:
+                    self._client.send(topic, stamp, value)
+                except struct.error as error:
+                    raise ValueError(f"{topic} cannot have {value}: {error}") from None
             if stamp >= end:
                 self._streams.pop(topic)
 
@@ -483,4 +491,5 @@ def _is_node(value: Any) -> bool:
 
 
 def _entry(node: Any) -> str:
+    require(isinstance(node, (str, type)), f"{node!r} is no node; give its class, or 'module:Class'")
     return node if isinstance(node, str) else f"{node.__module__}:{node.__qualname__}"

@@ -221,9 +221,7 @@ def test_a_node_that_fails_is_named(node: type, text: str, arm: RunningArm) -> N
 
 
 def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) -> None:
-    with pytest.raises(
-        AssertionError, match=r"0\.1 s of .*: arm\.run_until.* \(test_kit\.py:\d+\).* is \[0\.0, -0\.\d+, "
-    ):
+    with pytest.raises(AssertionError, match=r"0\.1 s of .*: arm\.run_until.* \(test_kit\.py:\d+\).* is \[0\.0, -0"):
         arm.run_until(lambda: False, 0.1)
     with pytest.raises(AssertionError, match=r"0\.1 s of .*: a fault of the driver; "):
         arm.run_until_fault(0.1)
@@ -245,6 +243,8 @@ def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text:
 
 
 def test_a_stack_that_has_ended_has_no_truth_and_is_not_started_again(arm: RunningArm) -> None:
+    with pytest.raises(ParameterError, match="is no node; give its class"):
+        arm.start(object())
     assert arm.context.ok()  # asking for it starts the stack
     arm.close()
     with pytest.raises(AssertionError, match="has ended; read the bag"):
