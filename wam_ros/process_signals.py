@@ -58,12 +58,17 @@ class Stop:
     """
 
     def __init__(self) -> None:
-        self.is_set, self.code = False, 0
+        self.code = 0
         for number in SIGNALS:
             signal.signal(number, self._take)
 
     def _take(self, number: int, frame: object) -> None:
-        self.is_set, self.code = True, 128 + number
+        self.code = 128 + number
+
+    @property
+    def is_set(self) -> bool:
+        """Whether a signal has come."""
+        return self.code > 0
 
 
 @contextmanager
@@ -77,8 +82,8 @@ def held_back() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    if came:
-        signal.raise_signal(came[0])
+        if came:
+            signal.raise_signal(came[0])
 
 
 @contextmanager
