@@ -121,6 +121,7 @@ def analyse(
     if is_table:
         bag, given = table_bag(path, series_of_csv(path), given)
     else:
+        progress("as a recording of another robot")
         bag = foreign_bag(found, given)
     return analyse_bag(bag, progress, given=given)
 
