@@ -72,10 +72,7 @@ class Configuration(NamedTuple):
         """YAML with these values as ROS reads them: no aliases, and no list of whole and other numbers."""
         tree = {}
         for name, flat in self.sections.items():
-            mixed = {
-                key for key, value in flat.items() if isinstance(value, list) and {*map(type, value)} == {int, float}
-            }
-            values = {key: list(map(float, value)) if key in mixed else value for key, value in flat.items()}
+            values = {key: list(map(float, value)) if _is_mixed(value) else value for key, value in flat.items()}
             tree[name if name == SHARED else f"{SHARED}/{name}"] = {PARAMETERS: nested(values)}
         return yaml_text.dump(tree)
 
@@ -404,3 +401,8 @@ def _made(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Configuratio
     return Configuration(
         path, MappingProxyType({name: MappingProxyType(dict(flat)) for name, flat in sections.items()})
     )
+
+
+def _is_mixed(value: Any) -> bool:
+    """Whether a value is a list of whole and other numbers, which ROS refuses."""
+    return isinstance(value, list) and {*map(type, value)} == {int, float}

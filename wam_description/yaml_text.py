@@ -118,14 +118,12 @@ def parameter_text(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     """
     tree = {
         node: {
-            "ros__parameters": nested(
-                {
-                    name: one if isinstance(one, (bool, int, float, str)) else list(one)
-                    for name, one in sorted(values.items())
-                    if one is not None
-                }
-            )
+            "ros__parameters": nested({name: _plain(one) for name, one in sorted(values.items()) if one is not None})
         }
         for node, values in sorted(parameters.items())
     }
     return dump(tree)
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, (bool, int, float, str)) else list(value)

@@ -24,6 +24,7 @@ from wam_description.yaml_text import parameter_text
 from wam_sim.simulation import SCENARIO, Simulation
 
 DESCRIPTION: Final = "robot_description"
+NAMESPACE: Final = "/wam"  # of the recorded topics
 
 
 def record(
@@ -108,7 +109,7 @@ class _Recording:
         return found
 
     def _full(self, topic: str) -> str:
-        return topic if topic.startswith("/") else f"/wam/{topic}"
+        return topic if topic.startswith("/") else f"{NAMESPACE}/{topic}"
 
     def _write_value(self, topic: str, encode: Encode, sender: str, stamp: int, value: Any) -> None:
         self._write(topic, encode(stamp, value), stamp, sender)
@@ -129,4 +130,4 @@ def _parameters(configuration: Configuration) -> str:
     nodes = {declared(entry).name for entry in configuration.shared.nodes}
     own = {name: flat for name, flat in configuration.sections.items() if name in nodes}
     shared = configuration.sections[SHARED]
-    return parameter_text({f"/wam/{name}": {**shared, **flat} for name, flat in own.items()})
+    return parameter_text({f"{NAMESPACE}/{name}": {**shared, **flat} for name, flat in own.items()})

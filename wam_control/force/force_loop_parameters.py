@@ -237,7 +237,7 @@ class ForceLoopParameters:
             self.is_estimated or arm.joint_sensors,
             f"feedback is '{self.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
         )
-        force_law(self)
+        force_law(self)  # a law refuses what does not fit it
         torque_law(self, arm.joints.names)
         springs = {"spring_stiffness": self.spring_stiffness, "spring_rest": self.spring_rest}
         lengths("force_loop", arm.joints.names, springs)
