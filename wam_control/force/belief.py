@@ -83,7 +83,7 @@ class WorldTorques(NamedTuple):
 
 def tolerance(desired: float, own: ForceLoopParameters) -> float:
     """Error, N, up to which a force of this size, N, counts as reached."""
-    return max(own.limits.tolerance * abs(desired), own.limits.least_tolerance)
+    return own.limits.tolerance * abs(desired)
 
 
 def predicted(
@@ -114,7 +114,7 @@ def predicted(
         resting=abs(resting),
         moving_surface=math.inf if touching < limits.surface_speed else limits.surface_speed / pace + slope,
         slow_arm=math.inf if is_slow else 0.0,
-        shaking_arm=limits.tolerance / limits.shake_force * shaking,
+        shaking_arm=limits.tolerance * shaking,  # a swing by the whole force is all that is tolerated
     )
 
 

@@ -65,16 +65,8 @@ class LimitParameters:
         low=0.01,
         live=True,
     )
-    least_tolerance: float = parameter(
-        "lower bound of the tolerated error, for small commanded forces", "N", high=1e3, live=True
-    )
     cycle_force: float = parameter(
         "smallest limit cycle that is reported: measured force, peak to peak, as a fraction of the commanded force",
-        live=True,
-    )
-    shake_force: float = parameter(
-        "with feedback contact_estimate: largest variation of the force due to the dither, peak to peak, on a surface "
-        "of guard.contact_stiffness, as a fraction of the commanded force; above it the arm holds its position",
         live=True,
     )
     surface_speed: float = parameter(
