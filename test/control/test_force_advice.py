@@ -14,7 +14,7 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.event import Code, Event
 from wam_description.signals import NO_CONTACT, ForceCommand, State
 
-LONG = 60  # periods, in which all is tried
+LONG = 80  # periods, in which all is tried
 UNPINNED = replace(OWN, contact_source="estimated")
 MOTORS = replace(OWN, feedback="contact_estimate")
 

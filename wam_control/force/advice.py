@@ -45,7 +45,7 @@ def tries(
     def is_obeyed(pose: Sequence[float], where: Sequence[tuple[float, ForcePlace]], size: float) -> bool:
         tried = task._replace(axes=(force._replace(value=size),))
         on_links = [(chance, axes.of(pose, tried, [at], [1.0])[0]) for chance, at in where]
-        return FORCE.reserve * believe(pose, on_links).doubt <= own.limits.doubt
+        return FORCE.hysteresis * believe(pose, on_links).doubt <= own.limits.doubt
 
     size = force.value or 0.0
     is_good = not place.is_pinned and is_obeyed(q, [(1.0, pinned)], size)  # first, as a refusal advises it at once

@@ -50,7 +50,7 @@ class CommandAdmission:
         """Admit the commands of one outer period."""
         before, self.refusals = self.force, {}
         force, posture, q = given.command, given.posture, given.joints.position
-        if force is not None and 0.0 < _size(force) < FORCE.smallest_force:
+        if force is not None and 0.0 < _size(force) < FORCE.rounding:
             force = force._replace(force=ZERO)
         reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
         self._age = self._age + given.dt if reason else 0.0
@@ -116,7 +116,7 @@ class CommandAdmission:
         cover, place = pinned
         length = covers.length_of(cover)
         own = torque_of_position(command.force, place)
-        if math.dist(own, command.torque) > FORCE.cross_lever * _size(command):
+        if math.dist(own, command.torque) > FORCE.least_lever * _size(command):
             return (
                 f"torque {command.torque} N m is commanded with the force {command.force} N on {cover}; allowed: zero, "
                 f"or (0, -x fz, x fy) for the contact position x; send joint torques on joint_torque_command"

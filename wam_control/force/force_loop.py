@@ -9,7 +9,6 @@ Forces are those of the arm on the world.
 
 import math
 from collections.abc import Sequence
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -182,7 +181,7 @@ class ForceLoop:
         admitted.step(own, given)
         self.refusals = admitted.refusals
         task, key = _task(admitted.force, given.task, own)
-        if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
+        if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.friction_turn):
             self._begin(task, key, given.contact is not None and not contact.cover)
         self._find_axes(task, contact)
         if own.mode == "open_loop" and given.task is None:
@@ -229,7 +228,7 @@ class ForceLoop:
             if is_free:
                 measurement.zero(limit)
             resting = measurement.resting
-        is_moving = is_zeroed and measurement.speed > FORCE.fast
+        is_moving = is_zeroed and measurement.speed > FORCE.slow
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.go_on(before)
         if self.supervision.watch is not None:
@@ -268,7 +267,7 @@ class ForceLoop:
         for one in run.axes:
             one.known = self._knowledge.of(q, one.on_links)
         run.move(moved, forces, q)
-        found = [holding(Code.REFUSED, "moved_fast", speed=FORCE.fast)] if run.is_moving else []
+        found = [holding(Code.REFUSED, "moved_fast", speed=FORCE.slow)] if run.is_moving else []
         is_led = bool(given.rate) or not all(one.now.is_force for one in run.axes)
         covers = {one.of.cover for one in run.axes if one.now.place}
         probable = contact.probability >= own.link_probability_limit
@@ -346,7 +345,7 @@ class ForceLoop:
         if not is_elsewhere or not torques.any():
             return q
         away = torques * (math.hypot(*contact.force) / float(torques @ torques))
-        return run.free_at + FORCE.way_back * away  # friction would hold it in less
+        return run.free_at + FORCE.creep * away  # friction would hold it in less
 
     def _rows(self, is_watching: bool, dt: float) -> list[VelocityRow]:
         """The commanded velocity along each axis; none while the arm is watched before it moves."""
@@ -445,7 +444,7 @@ class ForceLoop:
         found = []
         for i, (low, at, high) in enumerate(zip(joints.lower, self._q, joints.upper, strict=True)):
             end = low if unlimited[i] < 0.0 else high
-            near = own.limits.joint_margin + FORCE.push_back / max(own.limits.joint_gain, FORCE.push_back)
+            near = own.limits.joint_margin + FORCE.slow / max(own.limits.joint_gain, FORCE.slow)
             if abs(velocity[i]) < FORCE.stopped * abs(unlimited[i]) and abs(at - end) < near and own.limits.joint_gain:
                 name, margin = joints.names[i], own.limits.joint_margin
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=name, angle=at, end=end, margin=margin))
@@ -490,8 +489,7 @@ class ForceLoop:
             lambda pose, on_links: self._knowledge.of(pose, on_links),  # noqa: PLW0108
             self.parameters,
         )
-        for ways in islice(run.search, FORCE.each):
-            run.ways |= ways
+        run.ways |= next(run.search, {})
         return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
 
     def _output(self, velocity: Array, effort: list[float], is_task: bool) -> ForceOutput:

@@ -194,7 +194,7 @@ class ForceLoopParameters:
     @cached_property
     def rise_time(self) -> float:
         """Time in which the force on the stiffest surface may rise, s: some latencies of the measured force."""
-        return FORCE.rise * self.latency
+        return (FORCE.ramp + FORCE.shown) * self.latency
 
     def impact_energy(self, force: float) -> float:
         """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite if it is 0."""

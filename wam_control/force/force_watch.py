@@ -87,7 +87,7 @@ class TouchWatch:
     @property
     def is_bouncing(self) -> bool:
         """Whether the first touch was so short ago that an impact turns the force."""
-        return self.has_been and self._since < FORCE.bouncing_time
+        return self.has_been and self._since < FORCE.impact_time
 
 
 class Oscillation:
@@ -137,7 +137,7 @@ class Oscillation:
                 source=_source(own, self._is_dithered),
                 dither=float(self._is_dithered),
             )
-        if faint > FORCE.turns // 2 and self.share > FORCE.least_share:
+        if faint > FORCE.turns // 2 and self.share > FORCE.slowed**2:
             self.share *= FORCE.slowed
             self.rest()
         return self._lasting.report(event, dt, window, dt)
@@ -272,7 +272,7 @@ class ForceWatch:
         place = axis.place
         is_strange = seen.known.chi2 > FORCE.unexplained
         is_other = bool(seen.touched) and (is_strange or place is None or not place.is_pinned)
-        if not self._other.step(is_other, FORCE.conflict_time, FORCE.conflict_time, dt) or place is None:
+        if not self._other.step(is_other, FORCE.impact_time, FORCE.impact_time, dt) or place is None:
             return None
         return holding(Code.UNEXPLAINED, "other_link", cover=place.cover, touched=seen.touched)
 
@@ -307,7 +307,7 @@ class ForceWatch:
         if not self.touch.is_there or self._pattern is None:
             return []
         change = axis.sensed.changed(torques - known.force * self._pattern)
-        if not self._changed.step(change > FORCE.certain**2, FORCE.conflict_time, FORCE.conflict_time, dt):
+        if not self._changed.step(change > FORCE.certain**2, FORCE.impact_time, FORCE.impact_time, dt):
             return []
         return [warning(Code.UNEXPLAINED, "torques_changed", **where, chi2=change, allowed=FORCE.certain**2)]
 

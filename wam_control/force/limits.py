@@ -27,7 +27,7 @@ def joint_bounds(
         fastest = gain * (distance - margin) if gain else speed
         if fastest >= speed:  # as most joints are: far from their ends
             return speed
-        return max(fastest, 0.0) if distance >= 0.0 else max(gain * distance, -FORCE.push_back)
+        return max(fastest, 0.0) if distance >= 0.0 else max(gain * distance, -FORCE.slow)
 
     ends = zip(joints.lower, q, joints.upper, before, strict=True)
     each = [(-towards(at - lower), towards(upper - at), last) for lower, at, upper, last in ends]
@@ -66,7 +66,7 @@ def approach_speed(
         return max((whole + axis.desired * servo_yielding) / sensed.speed_fraction / rise, slowest)
     fastest = limits.impact * axis.desired / math.sqrt(sensed.impact_mass * own.guard.contact_stiffness)
     if not place.is_known:
-        detected = own.rise_time if own.is_estimated else FORCE.detected * own.force_filter
+        detected = own.rise_time if own.is_estimated else FORCE.shown * own.latency
         fastest = min(fastest, max(whole / detected, slowest))
     return fastest / sensed.speed_fraction
 

@@ -9,42 +9,34 @@ class ForceThresholds:
 
     # measured force
     steady_time: float = 0.1  # s, time constant of the torques that are taken as zero
-    fast: float = 0.3  # rad/s, above which a payload is not known from the torques of the motion
-    rested: float = 0.3  # s at rest, after which it is
+    slow: float = 0.3  # rad/s of a joint: faster, torques show no payload; nor is it faster back from beyond its end
     payload_rest: float = 0.05  # of the torques at rest: what a payload may leave of them
     certain: float = 3.0  # standard deviations of the torques, within which they show nothing
     unexplained: float = 16.0  # chi^2 of torques above which they are not those of the force
     # direction and lever of a force
-    smallest_force: float = 1e-6  # N; a smaller force is none: its direction is a rounding
-    cross_lever: float = 1e-3  # m, lever of the part of a torque that is not that of a force on the cover
-    least_lever: float = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
+    least_lever: float = 1e-3  # m; a shorter lever is none: such a force cannot be applied, such a torque is none
     least_normal: float = 0.5  # cosine of the angle of a force to the normal of the side of a link
     sized_force: float = 1.0  # N, for the size of tangential forces
     hand: float = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
     negligible: float = 1e-12  # of what is 1 where it counts
-    shortest_lever: float = 1e-9  # m or 1, of an axis along which nothing moves
-    rounding: float = 1e-9  # of sums of periods
+    rounding: float = 1e-9  # of sums of periods, N of a force without a direction, m or 1 of an axis that moves nothing
     rounded_speed: float = 1e-7  # rad/s, of the solution of a limited problem
     # touch and link
     touch: float = 0.2  # of the commanded force, from which something is touched
-    bouncing_time: float = 0.1  # s after the first touch, in which an impact turns the force
-    conflict_time: float = 0.1  # s, after which another contact counts: an impact looks like one
+    impact_time: float = 0.1  # s after a touch, in which its impact turns the force and looks like another contact
     # speed along a force
     settled: float = 3.0  # time constants within the settling time
-    creep: float = 3e-3  # m, least way within the settling time: slower, friction moves the arm in jerks
-    rise: float = 6.0  # latencies of the measured force, in which it may rise to the commanded one
-    detected: float = 2.0  # latencies of joint sensors, in which a touch is detected at a place that is not known
+    creep: float = 3e-3  # m, least way within the settling time, and back from a link: friction turns less into jerks
     identified_rise: float = 0.3  # s, in which the force may rise at a place that is not known
     finest_motion: float = 1.2e-5  # m, of the arm against its friction: a force is not set more finely
     kept: float = 0.3  # of the tolerance, up to which an error is left alone
     surface_slope: float = 0.01  # of a surface that moves across the force
-    friction_turn: float = 0.3  # s, in which the friction of the arm turns round
+    friction_turn: float = 0.3  # s, in which the friction of the arm turns round, or comes to rest
     slide_slope: float = 0.3  # of a surface along which a posture moves the link
     slow_posture: float = 0.2  # rad/s, below which a posture waits while a force is kept
-    way_back: float = 3e-3  # m, way back from another link than commanded
     # a force that is commanded, after the touch
     ramp: float = 4.0  # latencies of the measured force, in which it goes to the one that is desired
-    shown: float = 2.0  # of these, after which it is measured: the arm follows late, too
+    shown: float = 2.0  # of these, after which a force or a touch is measured: the arm follows late, too
     # feed-forward
     friction_time: float = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters
     slow_motor: float = 0.04  # rad/s, of a motor, below which less of the dry friction is fed forward
@@ -53,21 +45,17 @@ class ForceThresholds:
     watched_time: float = 0.2  # s, for which it is watched before the arm moves, or a whole cycle
     balances: int = 30  # steps, in which friction and vibration balance
     # events
-    hysteresis: float = 1.25  # of the doubt, above which an arm that has not touched yet holds again
+    hysteresis: float = 1.25  # of the doubt, above which an arm that has not touched yet holds again; spare of advice
     quarter: float = 0.25  # of the settling time, in which a force that has been reached may be off
     turns: int = 4  # of the force within the settling time, above which it oscillates
     faint_swing: float = 0.5  # of a swing that is reported, from which the arm is slowed down
-    slowed: float = 0.5  # of the speed along the force, from then on
-    least_share: float = 0.25  # of that speed, below which it is not slowed down
+    slowed: float = 0.5  # of the speed along the force, from then on; twice at most
     lasting: float = 0.2  # s, for which a push is reported after the last time
-    push_back: float = 0.3  # rad/s, at which a joint beyond its end is brought back, at most
     stopped: float = 0.5  # of the velocity without limits, below which a joint is at its end
     # advice
     more: tuple[float, ...] = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
     turned: tuple[float, ...] = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)  # rad, by which a joint is turned
     spare: float = 0.1  # rad, from where a joint may be no further: the arm moves on as it presses
-    each: int = 5  # ways that are tried in a period
-    reserve: float = 1.2  # by how much worse another force may be known, so that it still would be obeyed
 
 
 @dataclass(frozen=True, slots=True)
