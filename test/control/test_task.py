@@ -305,7 +305,7 @@ def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, Guar
     guard = StabilityGuard(WAM, SHARED.servo, SHARED.timing, GIVEN.guard, GIVEN.sensing_fed_back)
     world.step(task)
     axes = [one.now for one in world.loop._run.axes]
-    (forces,) = world.loop.supervision._guarded(world.loop._q, axes, NO_CONTACT)
+    (forces,) = world.loop.supervision._guarded(world.loop._pose.tolist(), axes, NO_CONTACT)
     assert isinstance(forces, GuardedForces)
     return guard, task_of_parameters(GIVEN), forces
 

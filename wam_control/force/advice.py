@@ -1,6 +1,6 @@
 """What to change so that a refused force would be obeyed: a joint to turn, more force, or a pinned position.
 
-A search over the belief of other forces in other poses, a few in each period, since one takes a fifth of a millisecond.
+A search over the belief of other forces in other poses, one in each period, since it takes a fifth of a millisecond.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +15,30 @@ from wam_description.event import Value
 from wam_description.parts import Joints
 
 Ways = dict[str, Value]
+
+
+class Search:
+    """What helps a refused force, as far as it is known by now.
+
+    Parameters
+    ----------
+    task : with this force.
+    found : what of the tries of `tries` helps, one after the other.
+
+    Attributes
+    ----------
+    task : that one.
+    ways : what helps; `searched` among it where all was tried.
+    """
+
+    def __init__(self, task: TaskCommand, found: Iterator[Ways]) -> None:
+        self.task, self._found = task, found
+        self.ways: Ways = {}
+
+    def step(self) -> Ways:
+        """Go on by one try; returns `ways`."""
+        self.ways |= next(self._found, {})
+        return self.ways
 
 
 def tries(

@@ -2,11 +2,10 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator
 
 import numpy as np
 
-from wam_control.force.advice import Ways
+from wam_control.force.advice import Search
 from wam_control.force.axes import CommandedAxis, Links
 from wam_control.force.belief import UNKNOWN
 from wam_control.force.contact_place import ContactPlace
@@ -165,12 +164,12 @@ class CommandRun:
     held_at : joint angles (n,), rad, that the arm holds while the command is not obeyed; None while it is.
     resting : torques at rest (n,), N m, that are the error of a model, not those of a touched surface.
     approached : way of the posture along the forces to what they touch (n,), rad.
-    free_at, before : where the arm last was free, and a period ago (n,), rad.
+    free_at : where the arm last was free (n,), rad.
     is_moving : whether the arm still moves as it did when the command began.
     delayed : speeds along the axes that are still to come, m/s or rad/s.
     motions : what is reported of the motions along the axes, or of the joints in a posture.
     friction : that is fed forward, N m at the joints (n,), filtered.
-    search, ways, sought : what would help a refused force: still to be tried, and found; of which command.
+    search : for what would help a refused force; None where none is.
     """
 
     def __init__(
@@ -189,15 +188,13 @@ class CommandRun:
         self.held_at: Array | None = None
         self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()
         self.approached = np.zeros_like(resting)
-        self.free_at = self.before = q
+        self.free_at = q
         self.is_moving = is_moving
         self.still_sd = still_sd
         self.delayed = list[list[float]]()
         self.motions = defaultdict[int, MotionWatch](MotionWatch)
         self.friction = LowPass()
-        self.search: Iterator[Ways] | None = None
-        self.ways: Ways = {}
-        self.sought: TaskCommand | None = None
+        self.search: Search | None = None
 
     def go_on(self, before: "CommandRun") -> None:
         """Of axes that were commanded before, keep where they touch and hold, and with what they press."""

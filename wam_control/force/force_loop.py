@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_control.force.advice import tries
+from wam_control.force.advice import Search, tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import AxisRun, CommandRun
@@ -83,7 +83,6 @@ class ForceLoop:
     Attributes
     ----------
     supervision : by the guard, with what it finds, does and reports.
-    parameters : those in force; with guard.mode `limit` they may be lower than given.
     refusals : why a present command is refused, by topic; the last good one remains in use.
     events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
     """
@@ -95,13 +94,12 @@ class ForceLoop:
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._measurement = ForceMeasurement(self._body)
         self._pushed = PushedArm(self._body)
-        self._velocity, self._q = np.zeros(len(arm.joints.names)), list[float]()
-        self._pose = self._velocity  # the same angles as an array
-        self._pressed_at = self._pose + math.inf
+        zero = self._velocity = self._moved = np.zeros(len(arm.joints.names))
+        self._pose = np.zeros(0)  # none so far
+        self._pressed_at = zero + math.inf
         self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self.tune(parameters)
-        zero = self._velocity
         self._run = CommandRun((), None, arm, timing, zero, zero, zero, False)
 
     def tune(self, parameters: ForceLoopParameters) -> None:
@@ -121,9 +119,13 @@ class ForceLoop:
             f"timing.dither_cycle is {timing.dither_cycle}: feedback 'contact_estimate' sees no swing of two outer "
             f"periods or less; allowed: 0, or above {fastest}",
         )
-        self.supervision = Supervision(arm, self._servo, timing, parameters, tuple(self._q))
-        self.parameters = self.supervision.parameters
+        self.supervision = Supervision(arm, self._servo, timing, parameters, tuple(self._pose.tolist()))
         self._axes = TaskAxes(self._body, ForceAxes(self._body, parameters.sensing_fed_back))
+
+    @property
+    def parameters(self) -> ForceLoopParameters:
+        """Those in force; with guard.mode `limit` they may be lower than given."""
+        return self.supervision.parameters
 
     @property
     def event(self) -> Event:
@@ -133,7 +135,7 @@ class ForceLoop:
     @property
     def is_advised(self) -> bool:
         """Whether the event of a refused force has what would help: it is looked for over several periods."""
-        return "searched" in self._run.ways
+        return self._run.search is not None and "searched" in self._run.search.ways
 
     @property
     def free_torques(self) -> list[float]:
@@ -163,10 +165,12 @@ class ForceLoop:
     def step(self, given: ForceInput) -> ForceOutput:
         """One outer period: the axes of what is commanded, then what is known of them, then the motion, then events."""
         own, joints, admitted = self.parameters, given.joints, self._admission
-        is_braked, is_first = not any(joints.effort), not self._q
-        self._q, self._pose = list(joints.position), np.array(joints.position)
-        if is_braked or is_first:
+        is_braked, pose, before = not any(joints.effort), np.array(joints.position), self._pose
+        self._pose = pose
+        if is_braked or not before.size:
             self._reset()
+        else:
+            self._moved = pose - before
         given = self._measurable(given)
         contact = given.contact or NO_CONTACT
         # a spring to which a force counts only from where it is certain would swing about there
@@ -177,7 +181,7 @@ class ForceLoop:
             topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
             given = given._replace(task=TaskCommand(BASE, torques), torque=None)
         if given.task is None and self._run.key[:1] == (TaskCommand,):
-            admitted.restart(self._q)  # the arm stays where it is
+            admitted.restart(joints.position)  # the arm stays where it is
         admitted.step(own, given)
         self.refusals = admitted.refusals
         task, key = _task(admitted.force, given.task, own)
@@ -185,7 +189,7 @@ class ForceLoop:
             self._begin(task, key, given.contact is not None and not contact.cover)
         self._find_axes(task, contact)
         if own.mode == "open_loop" and given.task is None:
-            effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(self._q)))
+            effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(pose)))
             self.events, self._velocity = (), np.array(joints.velocity)
             return ForceOutput([], effort.tolist(), frame=self._run.frame)
         if given.rate and admitted.posture != given.posture:
@@ -213,10 +217,10 @@ class ForceLoop:
 
     def _reset(self) -> None:
         """Hold this posture and forget what was before."""
-        self._admission.restart(self._q)
+        self._admission.restart(self._pose.tolist())
         self._measurement.restart()
         self._pushed.restart()
-        self._velocity = np.zeros(len(self._q))
+        self._velocity = np.zeros(len(self._pose))
         self._begin(None, ())
 
     def _begin(self, task: TaskCommand | None, key: tuple[object, ...], is_free: bool = False) -> None:
@@ -231,6 +235,7 @@ class ForceLoop:
         is_moving = is_zeroed and measurement.speed > FORCE.slow
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.go_on(before)
+        self._moved = np.zeros(len(self._pose))
         if self.supervision.watch is not None:
             self.supervision.watch.restart()
 
@@ -261,12 +266,10 @@ class ForceLoop:
         """What is known of each axis, and what its watch reports."""
         own, run, forces, torques = self.parameters, self._run, self._axes.forces, self._measurement.torques
         q, contact = self._pose, given.contact or NO_CONTACT
-        moved = q - run.before
-        run.before = q
         run.judge(q, self._measurement, forces, own.sensing.zero_limit)
         for one in run.axes:
             one.known = self._knowledge.of(q, one.on_links)
-        run.move(moved, forces, q)
+        run.move(self._moved, forces, q)
         found = [holding(Code.REFUSED, "moved_fast", speed=FORCE.slow)] if run.is_moving else []
         is_led = bool(given.rate) or not all(one.now.is_force for one in run.axes)
         covers = {one.of.cover for one in run.axes if one.now.place}
@@ -278,7 +281,7 @@ class ForceLoop:
                 continue
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
             one.touch.step(force, size, given.dt)
-            way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(moved))
+            way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(self._moved))
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
             seen = Seen(known, way, touched if is_touched else "", is_led)
             found += one.watch.step(axis, seen, torques.now, own, given.dt)
@@ -298,7 +301,7 @@ class ForceLoop:
         axes, contact, dt = [one.now for one in run.axes], given.contact or NO_CONTACT, given.dt
         holds = any(event.holds for event in found)
         if axes:
-            self.supervision.step(self._q, axes, contact, dt)
+            self.supervision.step(self._pose.tolist(), axes, contact, dt)
         may_watch = bool(axes) and own.is_estimated and not run.is_touching
         is_watching = may_watch and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
         torque_sd = self._measurement.torques.sd
@@ -321,7 +324,7 @@ class ForceLoop:
         step = own.limits.joint_acceleration * dt or math.inf
         if self._pushed.is_yielding or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes):
             step = math.inf  # a stiff hand would make a late arm swing
-        low, high = joint_bounds(self._q, self._body.arm.joints, own, self._velocity.tolist(), step)
+        low, high = joint_bounds(self._pose.tolist(), self._body.arm.joints, own, self._velocity.tolist(), step)
         velocity, free = solve(rows, wanted, least, low, high)
         limits = [] if velocity is free else self._at_ends(free, velocity)
         fed = run.fed_forward(holds, own)
@@ -334,7 +337,7 @@ class ForceLoop:
     def _towards(self, goal: Array, rate: Sequence[float] | None = None) -> Array:
         """Velocities (n,), rad/s, towards joint angles (n,), rad, that move at a rate (n,), rad/s."""
         gain, most = self.parameters.posture_gain, self.parameters.joint_speed_limit
-        each = zip(goal.tolist(), self._q, rate or [0.0] * len(self._q), strict=True)
+        each = zip(goal.tolist(), self._pose.tolist(), rate or [0.0] * len(goal), strict=True)
         return np.array([min(max(gain * (angle - at) + speed, -most), most) for angle, at, speed in each])
 
     def _hold_at(self, found: Sequence[Event], contact: Contact) -> Array:
@@ -442,7 +445,7 @@ class ForceLoop:
         """The joints that do not move on at their ends."""
         own, joints = self.parameters, self._body.arm.joints
         found = []
-        for i, (low, at, high) in enumerate(zip(joints.lower, self._q, joints.upper, strict=True)):
+        for i, (low, at, high) in enumerate(zip(joints.lower, self._pose.tolist(), joints.upper, strict=True)):
             end = low if unlimited[i] < 0.0 else high
             near = own.limits.joint_margin + FORCE.slow / max(own.limits.joint_gain, FORCE.slow)
             if abs(velocity[i]) < FORCE.stopped * abs(unlimited[i]) and abs(at - end) < near and own.limits.joint_gain:
@@ -463,8 +466,8 @@ class ForceLoop:
                 law = own.task.largest_rate, own.task.fastest(axis.is_joint)[0]
                 moving.append((of.name, of.unit, goal, of.speed, axis.at, *law))
         if not run.axes and given.posture is not None:
-            law, rates = (own.posture_gain, own.joint_speed_limit), given.rate or [0.0] * len(self._q)
-            each = zip(self._body.arm.joints.names, self._admission.posture, rates, self._q, strict=True)
+            law, rates = (own.posture_gain, own.joint_speed_limit), given.rate or [0.0] * len(self._pose)
+            each = zip(self._body.arm.joints.names, self._admission.posture, rates, self._pose.tolist(), strict=True)
             moving = [(name, "rad", goal, speed, at, *law) for name, goal, speed, at in each]
         lasting = FORCE.quarter * own.limits.settling_time
         events = [run.motions[i].step(*each, lasting, given.dt) for i, each in enumerate(moving)]
@@ -475,22 +478,25 @@ class ForceLoop:
         run = self._run
         is_one = len(run.axes) == 1 and not run.axes[0].now.is_joint
         is_refused = is_one and any(event.holds and event.cause == "error" for event in found)
-        if not is_refused or task != run.sought:  # what helps another force need not help this one
-            run.search, run.ways, run.sought = None, {}, task
+        # what helps another force need not help this one
+        if not is_refused or (run.search is not None and run.search.task != task):
+            run.search = None
         if not is_refused or task is None or (run.shaking.is_watched and not run.is_touching):
             return found  # a larger force would shake, too
-        places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)]
-        run.search = run.search or tries(
-            self._q,
-            task,
-            places,
-            self._axes,
-            self._body.arm.joints,
-            lambda pose, on_links: self._knowledge.of(pose, on_links),  # noqa: PLW0108
-            self.parameters,
-        )
-        run.ways |= next(run.search, {})
-        return [event.with_values(**run.ways) if event.cause == "error" else event for event in found]
+        if run.search is None:
+            places = [(chance, at) for chance, axis in run.axes[0].on_links if (at := axis.place)]
+            each = tries(
+                self._pose.tolist(),
+                task,
+                places,
+                self._axes,
+                self._body.arm.joints,
+                lambda pose, on_links: self._knowledge.of(pose, on_links),  # noqa: PLW0108
+                self.parameters,
+            )
+            run.search = Search(task, each)
+        ways = run.search.step()
+        return [event.with_values(**ways) if event.cause == "error" else event for event in found]
 
     def _output(self, velocity: Array, effort: list[float], is_task: bool) -> ForceOutput:
         measured = error = limited = ZERO
