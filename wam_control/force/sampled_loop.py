@@ -79,7 +79,7 @@ class SampledLoop:
         self.joint_stiffness = self.motor_from_joint.T @ (stiffness[:, None] * self.motor_from_joint)
         zero, one = np.zeros((n, n)), np.eye(n)
         # states: theta, thetad, q, qd
-        self._cable = np.hstack(
+        cable = np.hstack(
             [
                 np.diag(stiffness),
                 np.diag(damping),
@@ -88,11 +88,11 @@ class SampledLoop:
             ]
         )
         rotor = 1.0 / np.array(arm.motors.inertia)[:, None]
-        self._motor = -rotor * (np.hstack([zero, np.diag(arm.motors.viscous_friction), zero, zero]) + self._cable)
+        self._motor = -rotor * (np.hstack([zero, np.diag(arm.motors.viscous_friction), zero, zero]) + cable)
         self._motor_rate = np.hstack([zero, one, zero, zero])
         self._joint_rate = np.hstack([zero, zero, zero, one])
         viscous = np.hstack([zero, zero, zero, np.diag(arm.joints.viscous_friction)])
-        self._joint = self.motor_from_joint.T @ self._cable - viscous
+        self._joint = self.motor_from_joint.T @ cable - viscous
         self.inlet = np.vstack([zero, np.diag(rotor[:, 0]), zero, zero])
         self.kp, self.ki = np.array(servo.proportional_gain)[:, None], np.array(servo.integral_gain)[:, None]
 
