@@ -208,7 +208,7 @@ class ContactEstimator:
             return 0.0
         change = float(precision.dot(torques).dot(torques - before))
         passed = self._observer.age - then
-        return self._delay / passed * abs(change) / max(statistic, CONTACT.smallest_statistic)
+        return self._delay / passed * abs(change) / max(statistic, CONTACT.negligible)
 
     def _is_touched(self, is_pressing: bool) -> bool:
         """Whether something is detected, or was while the arm pressed on it, and the arm has not left it since."""
@@ -221,7 +221,7 @@ class ContactEstimator:
 
     def _is_detected(self, statistic: float, is_calm: bool) -> bool:
         detect, was_above = self._parameters.detect, self._is_above
-        self._is_above = statistic > (detect if is_calm else CONTACT.shaken * detect)
+        self._is_above = statistic > (detect if is_calm else CONTACT.alone * detect)
         if self._in_contact:
             return statistic > self._parameters.release
         return (is_calm and statistic > CONTACT.alone * detect) or (self._is_above and was_above)

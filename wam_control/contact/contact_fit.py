@@ -100,7 +100,7 @@ def log_evidence(rr: float, ra: float, aa: float, scale: float) -> float:
 def log_evidence_of_weight(rr: float, ra: float, aa: float, scale: float) -> float:
     """The same for a force of one sign: twice the probability that it is positive."""
     positive = 0.5 * math.erfc(-ra / math.sqrt(2.0 * (aa + scale**-2)))
-    return log_evidence(rr, ra, aa, scale) + math.log(2.0 * max(positive, CONTACT.least_chance))
+    return log_evidence(rr, ra, aa, scale) + math.log(2.0 * max(positive, CONTACT.negligible))
 
 
 class _Link(NamedTuple):
@@ -166,8 +166,8 @@ class _Part:
 
     def __init__(self, start: float, end: float) -> None:
         # of a link without any piece the position is unknown
-        self.mass, self.first = CONTACT.least_chance, 0.5 * CONTACT.least_chance * (start + end)
-        self.second = CONTACT.least_chance * (start * start + start * end + end * end) / 3.0
+        self.mass, self.first = CONTACT.negligible, 0.5 * CONTACT.negligible * (start + end)
+        self.second = CONTACT.negligible * (start * start + start * end + end * end) / 3.0
         self.along = self.first_along = 0.0
         self.low = self.high = math.nan
 
@@ -265,7 +265,7 @@ class ContactFit:
             found = [(link.log_density(x), x) for x in [low + (k + 0.5) * width for k in range(count)]]
             floor = max(found)[0] - CONTACT.search_depth
             likely = [each for each in found if each[0] > floor]
-            if len(likely) >= CONTACT.few_positions or refined == CONTACT.refinements:
+            if 2 * len(likely) >= CONTACT.peak_positions or refined == CONTACT.refinements:
                 break
             low, high = max(likely[0][1] - width, start), min(likely[-1][1] + width, end)
             count = CONTACT.peak_positions

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.thresholds import CONTACT
+from wam_control.thresholds import MOTION
 from wam_description.small_matrices import inverse, solution
 
 Array = NDArray[np.float64]
@@ -125,11 +126,11 @@ class ContactFusion:
         alike = past.forces[:, None] @ sides[:, :, 0]
         alike = np.concatenate((past.last.residual[None], alike[:, 0]))
         growth = _grown(now.residual, alike, covariance, slips)
-        if not CONTACT.least_likeness < growth[0] < CONTACT.most_growth:
+        if not 1.0 / CONTACT.most_growth < growth[0] < CONTACT.most_growth:
             self.reset()
             return None
         scale = np.ones(rows.shape[:2])
-        scale[:, 1:] /= growth[1:, None].clip(CONTACT.least_likeness, CONTACT.most_growth)
+        scale[:, 1:] /= growth[1:, None].clip(1.0 / CONTACT.most_growth, CONTACT.most_growth)
         rest = rows - (effects @ (past.predicts * scale[:, None])).transpose(0, 2, 1)
         precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
         found: Array = (
@@ -155,7 +156,7 @@ class ContactFusion:
             if self._widening > CONTACT.different:
                 self.reset()
         moments, last = self._moments, self._last
-        is_early = last is not None and now.time - last.torques.time < CONTACT.moment_interval
+        is_early = last is not None and now.time - last.torques.time < CONTACT.moment_interval - MOTION.rounding
         if is_early or now.own.diagonal().min() < CONTACT.finest_sd**2:
             return
         has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > CONTACT.pose_change
@@ -183,7 +184,7 @@ class ContactFusion:
         wanted = np.linalg.solve(levers, (present @ last.residual)[..., None])
         forces: Array = np.asarray(wanted[..., 0], np.float64)  # (links, 3), N
         moved = CONTACT.slip * np.abs(np.array([each.pose for each in past]) - now.pose).max(axis=1)
-        elapsed = np.array([now.time + CONTACT.moves_on - each.time for each in past])
+        elapsed = np.array([now.time + CONTACT.moment_interval - each.time for each in past])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, -1]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
         # by how much the force of each link was larger than `forces`, whose torques would then have been `alike`

@@ -201,7 +201,7 @@ class ModelErrors:
 
     def _grow(self, span: float) -> None:
         covariance = self.covariance + span * self._walk
-        scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), CONTACT.least_variance)))
+        scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), CONTACT.negligible)))
         self.covariance = covariance * scale * scale[:, None]
 
     def _learn(self, seen: Observation, span: float) -> None:

@@ -71,10 +71,10 @@ def model_prior(
         (
             [friction_error(name, way) for way in WAYS for name in shafts],
             math.hypot(given.moving_uncertainty, given.asymmetry_uncertainty),
-            CONTACT.tolerable_friction,
+            CONTACT.tolerable_motion,
         ),
         ([f"masses at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_mass),
-        ([f"inertias at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_inertia),
+        ([f"inertias at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_motion),
         ([*map(load_error, shafts)], loads, CONTACT.tolerable_torque),
         (
             [f"torque constant of {name}" for name in arm.motors.names],

@@ -12,30 +12,28 @@ class ContactThresholds:
     # contact, of arms with errors, its statistic was at most 16, that of the slower one 28
     sudden: float = 0.75
     shaking_time: float = 0.3  # s after a contact, in which the cables vibrate: the faster estimate is not used
-    shaken: float = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
-    # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
+    # times the threshold: detected in one period, and where cables vibrate in two, as a smaller one elsewhere
     alone: float = 2.0
-    smallest_statistic: float = 1e-12  # of the statistic of the torques, for a division
     settled: float = 2.0  # time constants of the observer, from the first sample until the estimate is ready
     # position, force and link of one contact
     smallest_force: float = 1e-6  # N, avoids a division by zero where there is no force
     search_depth: float = 8.0  # of the log of probability; positions further below the maximum are neglected
-    few_positions: int = 6  # positions in a peak; with fewer, it is refined
-    peak_positions: int = 12  # pieces of a refined peak
+    peak_positions: int = 12  # pieces of a refined peak; one of fewer than half as many is refined
     refinements: int = 4  # of a peak, each by a factor of two or more
     weak_prior: float = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
     end_length: float = 0.01  # m, length of the end of a link
     end_slopes: tuple[float, ...] = (0.05, 0.5)  # force across the tube per force along it, on its end
     reported_probability: float = 0.9  # probability of the set that is reported, of contacts
     largest_exponent: float = 500.0  # beyond it, the exponential function overflows
-    least_chance: float = 1e-300  # avoids the logarithm of 0
+    negligible: float = 1e-300  # avoids the logarithm of 0, and a division by it
     # N m, of external torques: below that rounding decides where a contact is, or on which link
     smallest_sd: float = 1e-4
     # probability of a force along the tube above which that is a reason why the link is not identified
     noted_probability: float = 0.05
     # several moments of one contact
-    # s, between moments: one and a half time constants of the observer, within which errors are alike
-    moment_interval: float = 0.0299
+    # s, between moments: one and a half time constants of the observer, within which errors are alike; the contact
+    # moves on so long after the last one
+    moment_interval: float = 0.03
     moments: int = 6  # past moments
     # N m, sd of the errors of one moment, below which rounding decides what moments have in common
     finest_sd: float = 1e-3
@@ -49,10 +47,7 @@ class ContactThresholds:
     slide_probability: float = 0.05  # probability of such a contact
     any_force: float = 2.0  # of its size: sd of the force of a contact, where only its speed counts
     any_position: float = 0.1  # m: sd of the position of a contact, where only its speed counts
-    # s that a contact moves on after the last moment: torques are 20 ms late, and moments that far apart
-    moves_on: float = 0.03
-    least_likeness: float = 0.25  # least torques of the same contact, of those of its last moment
-    most_growth: float = 4.0  # largest torques of the same contact, of those of its last moment
+    most_growth: float = 4.0  # by which the torques of a contact grow or fall from its last moment
     freedom: float = 10.0  # degrees of freedom
     unknowns: int = 3  # of a contact: its position and the force across the link
     different: float = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
@@ -68,12 +63,10 @@ class ContactThresholds:
     trust_time: float = 5.0  # s of motion, in which the size of the errors is followed
     margin: float = 2.0  # of that size: errors in contact are larger, and some come rarely
     largest_size: float = 4.0  # of that size
-    least_variance: float = 1e-30  # variance: avoids a division by zero for errors that are none
     sure: float = 2.0  # sd of an error that it must have beyond what is tolerable
     # errors of the model above which it is off
-    tolerable_friction: float = 0.2  # per friction
+    tolerable_motion: float = 0.2  # per friction, or per torque of the acceleration
     tolerable_mass: float = 0.04  # per torque
-    tolerable_inertia: float = 0.2  # per torque of the acceleration
     tolerable_torque: float = 0.05  # of load friction and torque constants, per torque
     tolerable_centre: float = 0.02  # m, of a centre of mass
     tolerable_delay: float = 3e-3  # s, of the torques
