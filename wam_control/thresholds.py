@@ -18,7 +18,7 @@ class MotionThresholds:
     steepest: float = 15.0  # rad/m, of a joint on a line
     exact: float = 1e-10  # m, of the nodes of a line
     reached: float = 1e-6  # m, between a node and the line; what is further from it is out of reach
-    rounding: float = 1e-9  # of sums of periods, s, and of angles and lengths, rad and m
+    rounding: float = 1e-9  # of sums of periods, s, and of angles, lengths and forces, rad, m and N
     shortest: float = 1e-6  # s, of a part of a trajectory: its fifth power is a number, too
     longest: float = 1e6  # s, of a part of a trajectory
     slowest_chirp: float = 1e-6  # Hz; the ratio of two frequencies is a number, too

@@ -15,6 +15,7 @@ from wam_control.force.force_measurement import ForceMeasurement, LowPass
 from wam_control.force.force_watch import ForceWatch, MotionWatch
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Covers, Servo, Timing
 from wam_description.rigid_body import Array
 from wam_description.signals import BASE
@@ -138,7 +139,7 @@ def harmonics(values: Array, turn: float) -> list[Phasors]:
     turn : of the first harmonic in a period, rad.
     """
     steps = np.arange(float(len(values)))
-    waves = [np.exp(1j * order * turn * steps) for order in range(1, math.ceil(math.pi / turn - FORCE.rounding))]
+    waves = [np.exp(1j * order * turn * steps) for order in range(1, math.ceil(math.pi / turn - MOTION.rounding))]
     shapes = np.column_stack([np.ones_like(steps), steps, *(part for one in waves for part in (one.real, -one.imag))])
     parts = np.linalg.lstsq(shapes, values)[0][2:]
     return [real + 1j * imaginary for real, imaginary in zip(parts[::2], parts[1::2], strict=True)]

@@ -50,7 +50,7 @@ class CommandAdmission:
         """Admit the commands of one outer period."""
         before, self.refusals = self.force, {}
         force, posture, q = given.command, given.posture, given.joints.position
-        if force is not None and 0.0 < _size(force) < FORCE.rounding:
+        if force is not None and 0.0 < _size(force) < MOTION.rounding:
             force = force._replace(force=ZERO)
         reason = _excess(_size(force), "force_limit", own.force_limit, "N") or self._unpinned(force)
         self._age = self._age + given.dt if reason else 0.0

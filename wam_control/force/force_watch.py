@@ -36,7 +36,7 @@ class Lasting:
             return False
         change = dt / max(after, dt) if is_there else -dt / max(back, dt)
         self._level = min(max(self._level + change, 0.0), 1.0)
-        self.is_on = self._level > 1.0 - FORCE.rounding or (self.is_on and self._level > FORCE.rounding)
+        self.is_on = self._level > 1.0 - MOTION.rounding or (self.is_on and self._level > MOTION.rounding)
         return self.is_on
 
     def report(self, event: Event | None, after: float, back: float, dt: float) -> list[Event]:

@@ -14,6 +14,7 @@ import numpy as np
 import quadprog
 
 from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
 from wam_description.rigid_body import Array
 from wam_description.small_matrices import inverse, length, outer, solution
 
@@ -81,7 +82,7 @@ def unlimited(rows: Sequence[VelocityRow], posture: Array) -> Array:
 
 def _used(rows: Sequence[VelocityRow]) -> list[VelocityRow]:
     """The rows along which something moves."""
-    return [row for row in rows if row.size > FORCE.rounding]
+    return [row for row in rows if row.size > MOTION.rounding]
 
 
 def _limited(
@@ -119,5 +120,5 @@ def linear(rows: Sequence[Array], n: int) -> tuple[Array, Array]:
     """The solution without limits, v = M s + N p, for the guard: M (n, p) and N (n, n) of rows (n,)."""
     used = [VelocityRow(row, 0.0) for row in rows]
     hold = inverse(_normal(_used(used), np.zeros(n))[0])
-    drive = [row.along * (RANK / row.size**2) if row.size > FORCE.rounding else 0.0 * row.along for row in used]
+    drive = [row.along * (RANK / row.size**2) if row.size > MOTION.rounding else 0.0 * row.along for row in used]
     return hold @ np.array(drive).T, hold

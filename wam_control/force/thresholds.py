@@ -19,7 +19,6 @@ class ForceThresholds:
     sized_force: float = 1.0  # N, for the size of tangential forces
     hand: float = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
     negligible: float = 1e-12  # of what is 1 where it counts
-    rounding: float = 1e-9  # of sums of periods, N of a force without a direction, m or 1 of an axis that moves nothing
     rounded_speed: float = 1e-7  # rad/s, of the solution of a limited problem
     # touch and link
     touch: float = 0.2  # of the commanded force, from which something is touched
