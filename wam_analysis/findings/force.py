@@ -35,9 +35,10 @@ def force_section(recording: AnalysedRecording) -> Section:
     sentences = [*map(_press_sentence, held), *([] if held else [f"{NO_FORCE}."])]
     sentences += [f"{what}: {why}." for what, why in reported]
     sentences += [WHOSE] * any(not one.hold.is_refused for one in held)
-    findings = [finding for one in held for finding in press_findings(one)] + _dynamic_range(held)
+    known = [one for one in held if math.isfinite(one.best.smallest)]
+    findings = [finding for one in held for finding in press_findings(one)] + _dynamic_range(known)
     wrong = [f"{what}." for what, _ in reported]
-    return Section("force", "Force", sentences, findings, _forces_verdict(held), wrong)
+    return Section("force", "Force", sentences, findings, _forces_verdict(held, known), wrong)
 
 
 def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -52,16 +53,14 @@ def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedRe
     return {name: found for name, found in steps.items() if found}
 
 
-def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
-    """How far the held forces were from the commanded ones, in a sentence."""
-    held = [one for one in held if not one.hold.is_short]
-    known = [one for one in held if math.isfinite(one.best.smallest)]
+def _forces_verdict(held: Sequence[HeldForce], known: Sequence[HeldForce]) -> tuple[str, ...]:
+    """How far the held forces were from the commanded ones, of which that is known, in a sentence."""
     if not known:
         return ()
-    controlled = [one for one in known if one.is_touching and not one.hold.is_refused]
+    controlled = [one for one in known if one.is_touching]
     errors = [100.0 * one.best.smallest / one.hold.commanded for one in controlled]
     reached = sum(error <= HOLD.force_tolerance for error in errors)
-    text = f"Forces: {reached} of {len(held)} within {HOLD.force_tolerance:g} %"
+    text = f"Forces: {reached} of {sum(not one.hold.is_short for one in held)} within {HOLD.force_tolerance:g} %"
     if errors:
         whose = "" if all(len(one.true) for one in controlled) else "measured "
         text += f", largest {whose}error with ripple {apart(max(errors), HOLD.force_tolerance)} %"
@@ -69,9 +68,8 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     return (f"{text}; nothing was touched: {free}." if free else f"{text}.",)
 
 
-def _dynamic_range(held: Sequence[HeldForce]) -> list[Finding]:
+def _dynamic_range(known: Sequence[HeldForce]) -> list[Finding]:
     """Dynamic range (3.2.1) of some forces."""
-    known = [one for one in held if math.isfinite(one.best.smallest)]
     if not known:
         return []
     smallest = max(one.best.smallest for one in known) or math.nan
@@ -150,22 +148,17 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     """Stability and limit cycles of the force loop, compared with chapter 5."""
     sentences: list[str] = []
     findings: list[Finding] = []
-    verdict: list[str] = []
     wrong: list[str] = []
-    refused = [one.hold.name for one in recording.held if one.hold.is_refused]
-    held = [one for one in recording.held if not one.hold.is_refused]
-    if refused:
-        sentences.append(f"Not controlled, so their stability is not evaluated: {', '.join(refused)}.")
+    held = recording.held
     for one in held:
         theory = recording.theories[one.hold.name]
         text, swings_on = _fate(one)
         found = [text, *(guard.sentence for guard in [theory.guarded] if guard)]
         sentences += [sentence for sentence in found if sentence not in sentences]
-        if swings_on:
-            is_growing = one.swinging is not None and one.swinging.swings.verdict is Verdict.DIVERGED
-            (wrong if is_growing else verdict).append(text)
-        findings += _cycle_findings(one, theory)
-    if not recording.held:
+        wrong += [text] * swings_on
+        if not one.hold.is_refused:
+            findings += _cycle_findings(one, theory)
+    if not held:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     elif lowered := recording.admitted[1]:
         sentences.append(f"At the start, the guard lowered parameters to stable values: {lowered}.")
@@ -173,24 +166,21 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
     least = margin_text(min(margins, default=math.nan), digits=3)
     margin = f"; predicted stable up to {least} times the gains at the start" * bool(margins)
-    if settled and not verdict and not wrong:
-        whose = "controlled forces" if refused else "forces"
-        count = "all" if settled == len(held) else f"{settled} of {len(held)}"
-        verdict.append(f"Stability: {count} {whose} settled{margin}.")
-    return Section("stability", "Stability and limit cycles", sentences, findings, verdict, wrong)
+    count = "all" if settled == len(held) else f"{settled} of {len(held)}"
+    shows = [f"Stability: {count} forces settled{margin}."] * bool(settled and not wrong)
+    return Section("stability", "Stability and limit cycles", sentences, findings, shows, wrong)
 
 
 def _fate(one: HeldForce) -> tuple[str, bool]:
     """A sentence on whether the force settles, and whether it, or a shaft, swings on."""
     if one.swinging is None:
-        return (
-            f"{one.hold.name}: neither the force nor a motor or joint was recorded; its stability is not known.",
-            False,
-        )
+        return f"{one.hold.name}: not controlled, not touching, or not recorded; its stability is not known.", False
     (shaft, seen), cycle = one.swinging, one.cycle
-    text = f"{one.hold.name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {fate_words(seen)}"
     is_cycle = cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded
-    if not (is_cycle or seen.verdict in SWINGS_ON):
+    if is_cycle and seen.verdict is not Verdict.DIVERGED:
+        seen = seen._replace(verdict=Verdict.LIMIT_CYCLE)
+    text = f"{one.hold.name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {fate_words(seen)}"
+    if seen.verdict not in SWINGS_ON:
         return f"{text}; no limit cycle detected.", False
     swing, what = cycle if is_cycle else seen, "last" if seen.verdict is Verdict.DIVERGED else "limit cycle of"
     size = shown(swing.peak_to_peak, "rad" if shaft else "N")

@@ -59,8 +59,7 @@ class HeldForce(NamedTuple):
 
     Attributes
     ----------
-    time, measured : (n,), s from the start, and the force that the loop measured.
-    time_true, true : (m,), the same of the true force; empty if it was not recorded.
+    measured, true : (n,) and (m,), what was recorded of the measured and of the true force; empty if nothing was.
     response : of the measured force; None if there is no step.
     touched : start of the contact, s from the start, at most `fresh` before it; NaN if the contact began earlier or is
         not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
@@ -75,9 +74,7 @@ class HeldForce(NamedTuple):
     """
 
     hold: Hold
-    time: Numbers
     measured: Numbers
-    time_true: Numbers
     true: Numbers
     response: StepResponse | None = None
     touched: float = math.nan
@@ -115,19 +112,17 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     true, estimated = (traces.along(signal)[rows] for signal in (traces.true, traces.estimated))
     duration = (hold.end - hold.begin) / 1e9
     signals = {"true": (time_true, true), "measured": (time, measured), "estimated": (time_true, estimated)}
-    if not np.any(np.isfinite(true)):
-        time_true, true = np.empty(0), np.empty(0)
+    known = np.isfinite(true)
     cover, position = _touched(traces, parameters, during)
     pushed = bool(np.any(during & traces.push.acts))
-    held = HeldForce(hold, time, measured, time_true, true, cover=cover, position=position, is_pushed=pushed)
+    held = HeldForce(hold, measured, true[known], cover=cover, position=position, is_pushed=pushed)
     if hold.is_refused:
         return held
-    touched, before = _touch_down(traces, parameters, hold), _before(traces, hold, measured)
-    known, response = np.isfinite(true), None
+    touched, before, response = _touch_down(traces, parameters, hold), _before(traces, hold, measured), None
     at, force = (time, measured) if len(measured) else (time_true[known], true[known])
     if len(force):
         followed, of_force = force_response(at, force, float(force[0]), hold.commanded, hold.commanded)
-        swinging: Swinging | None = Swinging("", of_force)
+        swinging = Swinging("", of_force) if held.is_touching else None
         if held.is_touching and len(measured) >= SHAFT.fewest_samples and not math.isnan(followed.settling):
             response = followed._replace(settling=max(followed.settling - np.fmax(touched, 0.0), 0.0))
             if before or not math.isnan(touched):  # they are those of the impact
@@ -140,7 +135,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     accuracy = {name: _accuracy(force[at >= steady] - hold.commanded) for name, (at, force) in signals.items()}
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
-    cycles = (_cycle(at[at >= late], force[at >= late], dither) for at, force in ((time_true, true), (time, measured)))
+    cycles = (_cycle(at[at >= late], force[at >= late], dither) for at, force in [*signals.values()][:2])
     return held._replace(
         response=response,
         touched=touched,
@@ -157,7 +152,7 @@ def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:
         stamps, value = measured_force(run, hold.axis, hold.begin, hold.end)
         return (stamps - hold.begin) / 1e9, value
     columns = run.wrench("force_measured")
-    if columns is None:
+    if columns is None or not np.any(columns.force):  # an open loop measures none
         return np.empty(0), np.empty(0)
     a, b = np.searchsorted(columns.stamp_ns, [hold.begin, hold.end])
     along: Numbers = columns.force[a:b] @ (hold.force / hold.commanded)
