@@ -102,13 +102,13 @@ def analyse(
     ValueError
         if it has not what is given.
     """
-    if not isinstance(source, (str, Path)):
-        bag, given = table_bag(Path("table"), series_of_frame(source), given)
-        return analyse_bag(bag, progress, given=given)
-    path = Path(source)
-    progress(f"reading {path}")
-    is_table = path.suffix.lower() in (".csv", ".tsv", ".txt")
-    if not is_table:
+    if isinstance(source, (str, Path)):
+        path = Path(source)
+        progress(f"reading {path}")
+        series = series_of_csv(path) if path.suffix.lower() in (".csv", ".tsv", ".txt") else None
+    else:
+        path, series = Path("table"), series_of_frame(source)
+    if series is None:
         found = read(path, ())
         if not any(found.counts.values()):
             raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
@@ -118,11 +118,11 @@ def analyse(
         raise ValueError(
             f"--namespace chooses an arm of this stack, but {path} is a recording of another robot; leave it out"
         )
-    if is_table:
-        bag, given = table_bag(path, series_of_csv(path), given)
-    else:
+    if series is None:
         progress("as a recording of another robot")
         bag = foreign_bag(found, given)
+    else:
+        bag, given = table_bag(path, series, given)
     return analyse_bag(bag, progress, given=given)
 
 
@@ -146,11 +146,10 @@ def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
 
 def _is_own(found: Bag) -> bool:
     """Whether a bag is of this stack: by what its recorder left in it, or by its topics."""
-    if PARAMETERS in found.attachments or RECORDING in found.metadata:
-        return True
     spaces = [name[: -len(own)] for name, one in found.types.items() for own, kind in OWN_TOPICS.items()
               if name.endswith(f"/{own}") and one == kind]  # fmt: skip
-    return any(spaces.count(space) > 1 for space in spaces)
+    is_recorded = PARAMETERS in found.attachments or RECORDING in found.metadata
+    return is_recorded or any(spaces.count(space) > 1 for space in spaces)
 
 
 def analyse_bag(
@@ -186,7 +185,9 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
         for section in sorted(sections, key=lambda section: not deviations(section.findings))
         for sentence in section.shows
     ]
-    shows = shows or [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
+    right = [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
+    moved = [one for one in sections if one.key == "stick_slip" and one.findings]
+    shows = shows or right or [(sentence, one.title) for one in moved for sentence in one.sentences]
     problems = _line("Problems", wrong, "none found.")
     return Section("verdict", "Verdict", (what, problems, _line("Shows", shows, "nothing that can be evaluated.")))
 
@@ -208,7 +209,9 @@ def _foreign_line(recording: AnalysedRecording) -> str:
     }
     held = [counted(len(those), what) for what, those in found.items() if those]
     unused = [title for title, kind in recording.bag.types.items() if kind == UNUSED]
-    line = f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
+    is_assumed = bool(found["joint"]) and recording.given.units.keys().isdisjoint(("position", "velocity"))
+    unit = " Joints taken as rotary (a linear one: --joint NAME --unit position=m)." * is_assumed
+    line = f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}.{unit}"
     return f"{line} Not used: {'; '.join(unused)}; rename those that you need: {RENAMED}." if unused else line
 
 

@@ -1,6 +1,7 @@
 """Limit cycles of joints and wrench axes in windows of a recording, or cycles that were commanded; their spectrum."""
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -39,7 +40,7 @@ class FoundCycle(NamedTuple):
 
 def repetition_section(recording: AnalysedRecording) -> Section:
     """What repeats, and whether it was commanded."""
-    findings, verdict, taken = [], [], set[str]()
+    findings, cycling, taken = list[Finding](), defaultdict[str, list[tuple[float, str]]](list), set[str]()
     alike: dict[str, list[str]] = {origin: [] for origin in ORIGINS}
     for one, quantity, label in traced(recording.states):
         unit, command = one.units[quantity], recording.command_of(one)
@@ -47,21 +48,21 @@ def repetition_section(recording: AnalysedRecording) -> Section:
         for piece in pieces(one, quantity):
             least = max(CYCLE.loud * piece.noise[quantity], LEAST[unit])
             for found in _of_piece(piece, quantity, own, least):
-                begin, end, cycle = found.episode
+                (begin, end, cycle), origin, error = found
                 name = label if label not in taken else f"{label} from {begin:.1f} s"
                 taken.add(name)
                 change = 100.0 * (cycle.growth - 1.0)
                 is_steady = CYCLE.changing < cycle.growth < 1.0 / CYCLE.changing
-                alike[found.origin].append(name + f" (changes by {change:+.0f} % from half to half)" * (not is_steady))
+                alike[origin].append(name + f" (changes by {change:+.0f} % from half to half)" * (not is_steady))
                 frequency = 1.0 / cycle.period
-                if found.origin in (LIMIT_CYCLE, UNKNOWN):
-                    size = f"{shown(frequency, 'Hz')}, {shown(cycle.peak_to_peak, unit)} peak to peak"
-                    verdict.append(f"{name} repeats at {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
+                if origin in (LIMIT_CYCLE, UNKNOWN):
+                    at = shown(frequency, "Hz")
+                    text = f"{name} repeats at {at}, {shown(cycle.peak_to_peak, unit)} peak to peak"
+                    text += ", not commanded" * (origin == LIMIT_CYCLE)
+                    cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text))
                 findings += [
-                    Finding(
-                        f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=found.origin, error=found.error
-                    ),
-                    Finding(f"{name}: frequency", "Hz", frequency, note=found.origin),
+                    Finding(f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=origin, error=error),
+                    Finding(f"{name}: frequency", "Hz", frequency, note=origin),
                     Finding(f"{name}: begin", "s", begin),
                     Finding(f"{name}: end", "s", end),
                     Finding(f"{name}: confidence", "", cycle.confidence),
@@ -69,7 +70,11 @@ def repetition_section(recording: AnalysedRecording) -> Section:
     which = "that was not commanded" if recording.commands else "in this recording"
     sentences = [f"{', '.join(names)}: {ORIGINS[origin]}." for origin, names in alike.items() if names]
     stated = sentences or [f"Nothing {which} repeats five times."]
-    return Section("stability", "Cycles", stated, findings, verdict)
+    shows = [
+        f"{max(those)[1]}{f', and {len(those) - 1} more at this frequency' * (len(those) > 1)}."
+        for those in cycling.values()
+    ]
+    return Section("stability", "Cycles", stated, findings, shows)
 
 
 def spectrum_section(recording: AnalysedRecording) -> Section:
@@ -80,7 +85,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
             continue
         begins.append(CYCLE.episode_cycles / float(np.ptp(piece.time)))
         unit = one.units[quantity]
-        for line in spectral_lines(piece.time, piece.values[quantity], piece.stamps, CYCLE.lines):
+        for line in spectral_lines(piece.time, piece.values[quantity], piece.stamps):
             begins.append(line.frequency)
             if 2.0 * line.amplitude > LEAST[unit]:
                 name = f"{label}, {shown(line.frequency, 'Hz')}"
@@ -90,8 +95,8 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
     span = f"To find vibrations below {least}, record longer without a gap."
-    silent = [] if findings else [f"No vibration was found above {least} that lasts throughout."]
-    return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
+    silent = f"No vibration was found above {least} that lasts throughout."
+    return Section("frequency", "Spectrum", (silent, span)[bool(findings) :], findings)
 
 
 def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:

@@ -1,6 +1,7 @@
 """Section about stick and slip."""
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -17,27 +18,24 @@ from wam_bag.arrays import Numbers
 
 def stick_section(recording: AnalysedRecording) -> Section:
     """How long each motor and joint was at rest, how often it moved; whether it sticks, or an encoder slips."""
-    sentences, findings, verdict = [], [], []
+    findings, verdict, alike = [], [], defaultdict[str, list[str]](list)
     wrong = [] if recording.is_foreign else [*_slipped(recording.states)]
     for one in recording.states:
-        command = recording.command_of(one)
-        # not a position that is sent once and held
-        is_speed = command is not None and len(command.time) >= SHAFT.fewest_samples
         least = SHAFT.motor_rest if one.topic == f"{recording.namespace}/motor_states" else SHAFT.joint_rest
-        found = sticking(one, command if is_speed else None, least) if one.is_joint else None
+        found = sticking(one, recording.command_of(one), least) if one.is_joint else None
         if found is None:
             continue
-        position = one.only("position").values.get("position", np.zeros(1))
-        if not found.begins and found.shortest and np.ptp(position) > SHAFT.joint_rest * SHAFT.way:
-            far = shown(float(np.ptp(position)), one.units["position"])
+        moved = float(np.ptp(one.only("position").values.get("position", np.zeros(1))))
+        if not found.begins and found.shortest and moved > SHAFT.joint_rest * SHAFT.way:
+            far = shown(moved, one.units["position"])
             slow = f"{shown(found.slowest or least)} {one.units['position']}/s"
-            sentences.append(f"{one.label}: moved by {far}, more slowly than {slow}, or too briefly.")
+            alike[f"moved by {far}, more slowly than {slow}, or too briefly"].append(one.label)
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
             Finding(f"{one.label}: motions", "", float(len(found.begins))),
         ]
-        sentence = f"{one.label}: {found.words}"
+        sentence = found.words
         if recording.is_foreign and found.stuck and found.begins:  # ours have the arm's time
             begins = [f"{at:.2f}" for at in found.begins[: LAYOUT.named]]
             begins += ["..."] * (len(found.begins) > LAYOUT.named)
@@ -46,8 +44,9 @@ def stick_section(recording: AnalysedRecording) -> Section:
                 sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
         if found.commanded > SHAFT.disobeyed and len(found.begins) > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
-            verdict.append(f"{sentence}.")
-        sentences.append(f"{sentence}.")
+            verdict.append(f"{one.label}: {sentence}.")
+        alike[sentence].append(one.label)
+    sentences = [f"{', '.join(labels)}: {sentence}." for sentence, labels in alike.items()]
     stated = [*(sentences or ["No velocity was recorded."]), *wrong]
     return Section("stick_slip", "Stick and slip", stated, findings, verdict, wrong)
 
@@ -132,9 +131,9 @@ def rest_speed(piece: Piece, least: float) -> float:
 
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:
     speed, position = command.only("velocity"), command.only("position")
-    if np.any(speed.values.get("velocity", 0.0)):
+    if len(speed.time) >= SHAFT.fewest_samples and np.any(speed.values.get("velocity", 0.0)):
         return np.interp(time, speed.time, speed.values["velocity"])
-    if len(position.time) < SHAFT.fewest_samples:
+    if len(position.time) < SHAFT.fewest_samples:  # it is sent once and held
         return np.zeros(len(time))
     return np.interp(time, position.time, np.gradient(position.values["position"], position.time))
 

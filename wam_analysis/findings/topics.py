@@ -22,7 +22,7 @@ UNUSUAL = {  # values in the unit of ROS that few robots reach
 def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
-    sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns, given)]
+    sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
     wrong = [*in_words(found), *(f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note)]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
@@ -42,11 +42,10 @@ def topics_section(recording: AnalysedRecording) -> Section:
     return Section("happened", "What happened", sentences, wrong=wrong)
 
 
-def _topic(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
+def _topic(name: str, columns: Columns) -> Iterator[str]:
     """What a topic holds."""
     if isinstance(columns, JointColumns) and len(columns.stamp_ns):
-        unit = f"positions in {given.scaled('position')[1]} (a linear joint: --joint NAME --unit position=m)"
-        yield f"{name}: {len(columns.stamp_ns)} messages; joints: {', '.join(columns.names)}; {unit}."
+        yield f"{name}: {len(columns.stamp_ns)} messages; joints: {', '.join(columns.names)}."
         numbers = np.hstack([columns.position, columns.velocity, columns.effort])
         number = len(columns.names)
         if none := [joint for i, joint in enumerate(columns.names) if not np.isfinite(numbers[:, i::number]).any()]:

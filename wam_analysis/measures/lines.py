@@ -17,7 +17,7 @@ class SpectralLine(NamedTuple):
     amplitude: float
 
 
-def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) -> list[SpectralLine]:
+def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[SpectralLine]:
     """The strongest lines of a spectrum, and the strongest within two octaves, as of a vibration next to a slow motion.
 
     A line is a maximum of the Hann periodogram that noise does not explain whose power is a power of the frequency
@@ -29,7 +29,6 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) ->
     time : (n,), s, at a constant rate.
     value : (n,), without NaN.
     stamps : (m,), s, when the samples were taken between which the values are on straight lines, or `time`.
-    most : lines that are returned at most.
     """
     n = len(value)
     if n < CYCLE.window_samples or not np.ptp(value) > 0.0:
@@ -43,7 +42,7 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers, most: int) ->
     sure = math.log(n / 2) + CYCLE.sure_line
     found: list[SpectralLine] = []
     for k in peaks[np.argsort(-power[peaks])].tolist():
-        is_clear = not found or (len(found) < most and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
+        is_clear = not found or (len(found) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
         if k < CYCLE.episode_cycles or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
             continue
         if power[k] < sure * max(_nearest(power, k), _noise(levels, k)):
