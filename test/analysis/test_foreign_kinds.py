@@ -155,6 +155,7 @@ def twice() -> list[Case]:
         Case("a simulation that stopped", ros1, slow, expected, "the first message of each is used"),
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
         Case("relayed", by_mcap_ros2, sent + relayed, expected, "3000 of 6000 messages repeat the one before"),
+        Case("fast", ros1, stamped(one("/js", 50.0, 0.7, 0.5, None, 120.0), lambda t: 1.01 * t), {}, "a clock is fast"),
         Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
         Case("less of a part", sqlite, sent + without(again[:1000], bool, "effort"), expected, "the first message of"),
     ]
@@ -255,7 +256,7 @@ def called_as_commands() -> list[Case]:
         Case("wrench", by_mcap_ros2, wrenches("/cmd/wrench", np.arange(3000) / 100.0, force), cycle),
         Case("at another rate", by_rosbags, joints("/js", time, ["a"], position=path) +
              joints("/cmd", time[::10], ["a"], position=path[::10]), {}, "", topic_map([], [], ["/cmd"], [], []),
-             ("Shows: nothing that can be evaluated.",)),
+             ("Shows: a: always in motion (",)),
     ]  # fmt: skip
 
 
