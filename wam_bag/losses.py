@@ -112,7 +112,8 @@ class Losses(NamedTuple):
             lines.append(f"Lost at the end: not known for {self.unfinished}, which published no final count.")
         if self.uncounted:
             lines.append(
-                "The recorder wrote no counts, because it was killed or its disk was full: further losses are unknown."
+                "The recorder wrote no counts: it was killed, its disk was full, or another tool wrote this bag. "
+                "Further losses are unknown."
             )
         return lines
 

@@ -23,7 +23,10 @@ class RosbagsFile(BagFile):
     ) -> None:
         super().__exit__(kind, value, trace)
         if isinstance(value, Exception) and not isinstance(value, (BagError, OSError)):
-            raise BagError(f"{self.path} cannot be read by rosbags: {value}") from value
+            raise BagError(
+                f"{self.path} cannot be read by rosbags: {value}; if it was cut off, repair it by 'rosbag reindex' "
+                "(.bag) or 'sqlite3 FILE .recover' (.db3)"
+            ) from value
 
     def open(self) -> None:
         """List the topics."""
