@@ -32,7 +32,7 @@ RENAMED = (
 WRENCH = ("force", "torque")  # quantities along x, y and z
 
 
-def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
+def series_of_csv(path: Path) -> Mapping[str, Any]:
     """Columns of a CSV file, as text, by their titles; the delimiter is the one that the titles have.
 
     Raises
@@ -76,7 +76,8 @@ def series_of_frame(table: Any) -> Mapping[str, Any]:
     if not hasattr(table, "reset_index"):
         raise BagError(f"{type(table).__name__} is no table; give columns by title: a DataFrame, or a dict of arrays")
     is_time = table.index.name is None and table.index.dtype.kind in "mM" and "time" not in table
-    return (table.rename_axis("time") if is_time else table).reset_index()
+    table = (table.rename_axis("time") if is_time else table).reset_index()
+    return table.set_axis([".".join(map(str, np.atleast_1d(one))).strip(".") for one in table], axis=1)
 
 
 def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[Bag, TopicMap]:
@@ -103,7 +104,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     """
     if given.topics or given.commands:
         raise ValueError(f"{path} is a table and has no topics: leave out --topic and --command. {COMMANDS}")
-    _require_once(path, [str(title) for title in series])
+    _require_once(path, [*map(str, series)])
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     found |= {quantity: [one for one in found[quantity] if one.name in tuple("xyz")] for quantity in WRENCH}
