@@ -5,11 +5,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.contact_list import NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, ListedContact
+from wam_analysis.contact_list import NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, ListedContact, median
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT, TOUCH
-from wam_bag.arrays import Numbers
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 
 BLIND = "Contacts while the brakes hold are not compared: without joint sensors they are not detected."
@@ -42,15 +41,18 @@ def contact_section(recording: AnalysedRecording) -> Section:
         both = touching & sensed.acts & (sensed.frame == true.frame)
         is_estimate = both & sensed.is_placed & ~sensed.is_lower_bound
         right = 100.0 * float(np.mean(both[touching]))
-        away = 100.0 * _middle(np.abs(sensed.position - true.position)[both])
-        off = _middle(np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate])
+        away = 100.0 * median(np.abs(sensed.position - true.position)[is_estimate])
+        off = median(np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate])
         vector = "norm of the error vector; without forces that are lower bounds"
         findings += [
             Finding("correct link, of true contact time", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
             Finding("norm of the force error, median", "N", off, note=vector),
         ]
-        shows.append(f"Contacts: correct link for {right:.3g} % of true contact time{_errors(away, off)}.")
+        medians = {"position": shown(away, "cm"), "force vector": shown(off, "N")}
+        errors = ", ".join(f"{what} {error}" for what, error in medians.items() if error != "-")
+        errors = f"; median error of all samples: {errors}" * bool(errors)
+        shows.append(f"Contacts: correct link for {right:.3g} % of true contact time{errors}.")
     if np.any(known):
         note = "false contacts, and the ends of others"
         findings.append(Finding("contact estimated where none is", "s", traces.false_seconds, note=note))
@@ -64,12 +66,6 @@ def contact_section(recording: AnalysedRecording) -> Section:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else stated(NOT_ESTIMATED))
     return Section("contact", "Contact", sentences, findings, shows, wrong)
-
-
-def _middle(values: Numbers) -> float:
-    """Median of those that are known, NaN without any."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else math.nan
 
 
 def declared_position(recording: AnalysedRecording, contact: ListedContact) -> float:
@@ -123,9 +119,3 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     yield from (f"{name}: {reason}." for reason in contact.reasons)
     if contact.true not in ("", contact.link) and not contact.is_false:
         yield f"{name}: {contact.true} was touched."
-
-
-def _errors(away: float, off: float) -> str:
-    known = [f"position {shown(away, 'cm')}"] * math.isfinite(away)
-    known += [f"force vector {shown(off, 'N')}"] * math.isfinite(off)
-    return f"; median error of all samples: {', '.join(known)}" * bool(known)

@@ -28,7 +28,7 @@ NO_FRICTION = "The friction of the joints cannot be identified: no recorded effo
 def effort_section(recording: AnalysedRecording) -> Section:
     """Friction and inertia of the joints of another robot."""
     states = recording.states
-    sentences, findings, brief, alone = [], [], [], []
+    sentences, findings, alone = [], [], []
     doubts, wrong = list[str](), list[str]()
     moving = [one for one in states if one.is_joint and not rests(one)]
     driven = {one.name for one in moving if _acts(one)}
@@ -52,10 +52,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         findings += [
             Finding(f"{one.label}: {what}", unit, known.value, error=known.error) for what, unit, known in numbers
         ]
-        unexplained = f"unexplained: {100.0 * found.unexplained:.2f} % of the effort (rms)"
-        brief.append(f"{one.label}: {_stated(numbers)}; {unexplained}.")
         missing = [what for what, _, known in every if not (math.isnan(known.value) or known.is_sure)]
-        remarks = [unexplained]
+        remarks = [_stated(numbers), f"unexplained: {100.0 * found.unexplained:.2f} % of the effort (rms)"]
         if math.isnan(found.inertia.value):
             alone.append(one.label)
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
@@ -69,7 +67,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
             "friction from a delay of the effort."
         )
     stated = (FIT if sentences else NO_FRICTION, *sentences, *doubts, *wrong)
-    return Section("friction", "Friction", stated, findings, brief, wrong)
+    return Section("friction", "Friction", stated, findings, sentences, wrong)
 
 
 def _acts(source: Source) -> bool:
@@ -101,8 +99,8 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
 
 def limited(source: Source, quantity: str = "effort") -> str:
     """That a quantity stays at its bounds for long, which none with its noise does; '' where it does not."""
-    value = source.only(quantity).values.get(quantity, np.zeros(0))
-    bounds = (float(np.min(value, initial=math.inf)), float(np.max(value, initial=-math.inf)))
+    value = source.only(quantity).values.get(quantity, np.zeros(1))
+    bounds = float(np.min(value)), float(np.max(value))
     share = float(np.mean(np.isin(value, bounds) & (value != 0.0))) if bounds[0] < bounds[1] else 0.0  # 0 is off
     if share < SHAFT.limited:
         return ""
