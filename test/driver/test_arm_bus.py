@@ -16,7 +16,7 @@ from wam_description.event_text import sentence
 from wam_driver.bus import frames
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_fault import BusFault
-from wam_driver.bus.frames import Frame
+from wam_driver.bus.frames import BusGroup, Frame
 from wam_driver.bus.line import CanLine, Line, answer
 from wam_driver.bus.motor import Motor
 from wam_driver.bus.safety_module import SafetyMode
@@ -24,6 +24,7 @@ from wam_driver.bus.simulator import SimulatedBus, SimulatedController
 from wam_driver.bus.start_up import Wait
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
+from wam_driver.thresholds import BUS
 
 PERIOD = 0.002
 STOP = 0.050  # s of bus time, from a fault to zero torque
@@ -54,7 +55,7 @@ class Served(CanLine):
         return is_taken
 
     def receive(self, timeout: float) -> Frame | None:
-        frame = super().receive(0.01)  # by the kernel
+        frame = super().receive(0.2 if timeout else 0.01)  # by the kernel
         if frame is None:
             self.sleep(timeout)
         return frame
@@ -146,15 +147,17 @@ def test_velocities_are_those_of_the_motors() -> None:
 
 def test_a_late_period_is_no_jump_of_a_motor_that_moves() -> None:
     motor = Motor(1, 4096, 1.0, 1)
-    answers = [(frames.position(1, count).data, time) for count, time in ((0, 0.0), (1400, 0.1), (2800, 0.102))]
-    assert [motor.take(answer, time) for answer, time in answers] == [True, True, False]
+    assert [motor.take(count, time) for count, time in ((0, 0.0), (1400, 0.1), (2800, 0.102))] == [True, True, False]
     assert motor.velocity == pytest.approx(math.tau * 1400 / 4096 / 0.1)
 
 
-def test_an_arm_without_a_zero_waits_for_a_person_at_home() -> None:
+def test_in_estop_the_start_waits_for_shift_idle_and_for_a_person_at_home() -> None:
     rig = Rig()
+    rig.bus.is_attended = False
     rig.bus.switch(SafetyMode.ESTOP)
     rig.plant.brake(True)  # the person holds it
+    assert rig.start(1.0) == [Wait.IDLE]
+    rig.bus.switch(SafetyMode.IDLE)
     assert rig.start(3.0)[-1] is Wait.HOME
     assert not rig.arm.is_running
     assert rig.arm.confirm_home()
@@ -185,15 +188,6 @@ def test_the_zero_is_lost_with_the_counts_of_one_controller(version: int) -> Non
     assert rig.start()[-1] is Wait.ACTIVATE
     rig.run(0.1)
     assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.05)
-
-
-def test_in_estop_the_start_waits_for_shift_idle() -> None:
-    rig = Rig()
-    rig.bus.is_attended = False
-    rig.bus.switch(SafetyMode.ESTOP)
-    assert rig.start(1.0) == [Wait.IDLE]
-    rig.bus.switch(SafetyMode.IDLE)
-    assert rig.start(3.0)[-1] is Wait.HOME
 
 
 def test_torques_are_clipped_where_the_arm_and_its_safety_module_clip_them() -> None:
@@ -279,8 +273,14 @@ def stuck_asleep(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
     return lambda frame: [] if frame.identifier == chosen and len(frame.data) == 6 else [frame]
 
 
-def foreign(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
-    return lambda frame: [frame, frames.get(chosen, 5)] if frame.sender == chosen else [frame]
+def second_host(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    """It asks for positions, too: all are answered twice."""
+    request = frames.get(BusGroup.MOTORS, 48)
+    return lambda frame: [request] * (frame.sender == 1) + [frame] * (1 + (frame.receiver == BusGroup.POSITIONS))
+
+
+def cut_short(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    return lambda frame: [Frame(frame.identifier, frame.data[: 2 if frame.sender == chosen else 8])]
 
 
 def refused(seconds: float) -> Inject:
@@ -295,6 +295,15 @@ def refused(seconds: float) -> Inject:
         rig.bus.on_line = refuse
 
     return inject
+
+
+def estop_as_it_starts(rig: Rig, draw: random.Random) -> None:
+    def press_it(frame: Frame) -> list[Frame]:
+        if frame == frames.get(1, 0):
+            press(SafetyMode.ESTOP)(rig, draw)
+        return [frame]
+
+    rig.bus.on_line = press_it
 
 
 def power_off(rig: Rig, draw: random.Random) -> None:
@@ -341,6 +350,7 @@ AT_START: dict[str, tuple[Inject, BusFault]] = {
     "no torque": (setting(0, "MT"), BusFault.LIMIT),
     "wrong index": (setting(9, "PIDX"), BusFault.INDEX),
     "wrong group": (setting(5, "GRPC"), BusFault.INDEX),
+    "E-stop as it starts": (estop_as_it_starts, BusFault.ESTOP),
     "full queue at the start": (refused(math.inf), BusFault.NOT_SENT),
 }  # fmt: skip
 RUNNING: dict[str, tuple[Inject, BusFault]] = {
@@ -356,7 +366,8 @@ RUNNING: dict[str, tuple[Inject, BusFault]] = {
     "idle controller": (setting(0, "MODE"), BusFault.CONTROLLER_IDLE),
     "doubled node": (on_line(doubled), BusFault.DOUBLED),
     "jumping encoder": (on_line(jumping), BusFault.JUMP),
-    "second host": (on_line(foreign), BusFault.FOREIGN),
+    "second host": (on_line(second_host), BusFault.FOREIGN),
+    "positions cut short": (on_line(cut_short), BusFault.NO_REPLY),
     "full queue": (refused(0.03), BusFault.NOT_SENT),
 }
 
@@ -386,7 +397,9 @@ def test_a_fault_of_the_bus_is_named_and_ends_the_torque(kind: str, seed: int) -
     inject(rig, draw)
     begun = last = rig.bus.now()
     while rig.bus.now() < begun + 0.15:
+        before = rig.bus.now()
         rig.step()
+        assert rig.bus.now() - before < BUS.silent, "another request to the node waits no longer"
         last = rig.bus.now() if any(rig.bus.commanded) else last
     assert rig.arm.trouble is not None
     assert rig.arm.trouble.cause == fault

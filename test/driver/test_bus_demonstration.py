@@ -28,9 +28,7 @@ from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 
 MORE = 0.03  # of the commanded force, by which the true force may be further off over the bus
-WRIST = (
-    0.08  # of the commanded force, by which that of the wrist may be off; a refused one is off by a quarter and more
-)
+WRIST = 0.08  # the same, by which that of the wrist may be off; a refused one is off by a quarter and more
 FRICTION = 0.1  # of the configured friction, which is the true one, by which that of a recording may differ
 
 

@@ -50,10 +50,6 @@ def test_every_frame_is_read_by_the_independent_decoder() -> None:
     assert differing == 0
 
 
-def test_torques_are_packed_as_in_the_published_example() -> None:
-    assert frames.torques(BusGroup.ARM, 42, [1, -1, 8191, -8191]) == Frame(0x401, bytes.fromhex("aa0007fff7ffe001"))
-
-
 @pytest.mark.parametrize(
     ("frame", "identifier", "data"),
     [
@@ -64,6 +60,7 @@ def test_torques_are_packed_as_in_the_published_example() -> None:
         (frames.reply(10, 8, 2), 0x546, "880002000000"),
         (frames.position(2, -1), 0x443, "3fffff"),
         (frames.torques(BusGroup.WRIST, 42, [1]), 0x402, "aa00040000000000"),
+        (frames.torques(BusGroup.ARM, 42, [1, -1, 8191, -8191]), 0x401, "aa0007fff7ffe001"),  # published
     ],
 )
 def test_frames_have_the_identifiers_of_the_bus(frame: Frame, identifier: int, data: str) -> None:
@@ -96,11 +93,8 @@ def test_properties_have_the_number_of_the_firmware(name: str, is_safety: bool, 
     assert {version: properties.numbers(version, is_safety)[name] for version in numbers} == numbers
 
 
-def test_a_property_that_the_firmware_lacks_has_no_number() -> None:
+def test_two_properties_of_one_firmware_have_two_numbers_and_one_that_it_lacks_none() -> None:
     assert "POLES" not in properties.numbers(40)
-
-
-def test_two_properties_of_one_firmware_have_two_numbers() -> None:
     for is_safety in (False, True):
         for version in range(44, 210):
             numbers = properties.numbers(version, is_safety).values()

@@ -15,13 +15,15 @@ from wam_driver.bus.line import line_of
 BUS4 = Configuration.load(packaged("barrett-wam4-bus"))
 
 
-def virtual(name: str) -> BusParameters:
-    return BUS4.with_values({"driver:interface": "virtual", "driver:channel": name}).node("driver", BusParameters)
+def parameters(interface: str, channel: str) -> BusParameters:
+    return BUS4.with_values({"driver:interface": interface, "driver:channel": channel}).node("driver", BusParameters)
 
 
 def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
     with can.Bus(interface="virtual", channel="dry") as other:
-        line = line_of(BUS4.shared, virtual("dry"), time)
+        line = line_of(BUS4.shared, parameters("virtual", "dry"), time)
+        (text,) = heard(line, 0.05)
+        assert "the bus is silent while no driver asks" in text, "that is no fault"
         for count in (100, 200, 300):
             position = frames.position(2, count)
             other.send(can.Message(arbitration_id=position.identifier, data=position.data, is_extended_id=False))
@@ -31,19 +33,9 @@ def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
     assert [re.sub(" +", " ", text).strip() for text in found] == ["3 443 00 01 2c controller 2 has P = 300"]
 
 
-def test_a_silent_bus_is_no_fault() -> None:
-    line = line_of(BUS4.shared, virtual("silent"), time)
-    (text,) = heard(line, 0.05)
-    line.close()
-    assert "the bus is silent while no driver asks" in text
-
-
 @pytest.mark.parametrize("version", [60, 200])
 def test_what_would_be_sent_has_every_step_of_the_start_and_no_torque(version: int) -> None:
-    own = BUS4.with_values({"driver:interface": "simulated", "driver:channel": str(version)}).node(
-        "driver", BusParameters
-    )
-    found = list(sent(BUS4.shared, own, version))
+    found = list(sent(BUS4.shared, parameters("simulated", str(version)), version))
     remarks = [text for text in found if text.startswith("--")]
     assert [part in "\n".join(remarks) for part in ("wake up", "confirm_home", "each period")] == [True] * 3
     torques = [text for text in found if "torques" in text and not text.startswith("--")]

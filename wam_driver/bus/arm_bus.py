@@ -89,6 +89,7 @@ class ArmBus:
         """Brake, and let the safety module go to idle where its firmware takes that from the host."""
         if self._cycle:
             self._cycle.stop()
+            self.wait = Wait.ACTIVATE  # until the safety module answers
 
     def command(self, currents: Sequence[float]) -> None:
         """Send torques at once, A each, clipped; nothing unless the motors are released."""
@@ -98,6 +99,7 @@ class ArmBus:
     def close(self) -> None:
         """Stop, as an active arm without a driver would end in E-stop and lose its zero, and end the connection."""
         self.stop()
+        self._line.sleep(BUS.between_writes)  # an adapter may drop what it has not sent
         self._line.close()
 
     def exchange(self, periods: int = 1) -> None:

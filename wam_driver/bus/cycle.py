@@ -1,7 +1,6 @@
 """What is sent and taken in each period once the arm is started."""
 
-import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from wam_description.event import Value
 from wam_driver.bus import frames
@@ -34,7 +33,6 @@ class Cycle:
         self.safety_mode: int = SafetyMode.IDLE
         self._patience = BUS.collect * period + host.line.slack
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
-        self._lost_at = -math.inf  # s, when a position did not come in time
         self._torque, self._mode = host.number(BusGroup.MOTORS, "T"), host.number(BusGroup.MOTORS, "MODE")
         # the pendant first: it states why the mode changes
         requested = (SAFETY, "PEN"), (SAFETY, "MODE"), (BusGroup.MOTORS, "MODE"), (BusGroup.MOTORS, "P")
@@ -45,13 +43,14 @@ class Cycle:
         """Let the controllers idle, or follow their torques, which are zero first."""
         self.is_released = not on
         self.command([0.0] * len(self.motors))
-        self._host.write(BusGroup.MOTORS, "MODE", BUS.idle_mode if on else BUS.torque_mode)
+        self._host.send(frames.put(BusGroup.MOTORS, self._mode, BUS.idle_mode if on else BUS.torque_mode))
 
     def stop(self) -> None:
         """Brake, and let the safety module go to idle where its firmware takes that from the host."""
         self.brake(True)
         if self.safety_mode == SafetyMode.ACTIVE and self._host.versions[SAFETY] >= BUS.settable_version:
-            self._host.write(SAFETY, "MODE", SafetyMode.IDLE)
+            self._host.send(frames.put(SAFETY, self._host.number(SAFETY, "MODE"), SafetyMode.IDLE))
+            self.safety_mode = SafetyMode.IDLE  # until it answers otherwise
 
     def command(self, currents: Sequence[float]) -> None:
         """Send torques by currents, A, (n,), clipped."""
@@ -64,52 +63,65 @@ class Cycle:
         """Ask for positions and, from time to time, modes; take what comes."""
         host = self._host
         if host.trouble:
-            self.brake(True)  # in every period, as one may not have arrived
-        if host.now() >= self._poll_at:
-            self._poll()
-        for _ in range(BUS.most_frames):
-            if (late := host.line.receive(0.0)) is None:
-                break
-            # a position that was awaited before is no answer to this request
-            if late.identifier not in self._by_answer or host.now() - self._lost_at > BUS.silent:
-                self._take(late)
+            self.stop()  # in every period, as one may not have arrived
+        for late in self._arriving(0.0):
+            self._take(late)  # a position that was awaited before is no answer to this request
         host.send(self._requests[-1])
+        self._owe()
         requested, awaited = host.now(), self._by_answer.copy()
+        if requested >= self._poll_at:  # after the positions, whose times it would change
+            self._poll()
+        for frame in self._arriving(self._patience):
+            found, motor = self._take(frame), awaited.get(frame.identifier)
+            if motor and found and motor.take(found.value, requested):
+                del awaited[frame.identifier]
+                if not awaited:
+                    return
+        self._judge(awaited.values())
+
+    def _arriving(self, patience: float) -> Iterator[Frame]:
+        """Frames, each waited for so long, s, but for a period in all; later only those that are there."""
+        host = self._host
+        end = host.now() + self._period + host.line.slack
         for _ in range(BUS.most_frames):
-            if not awaited or (frame := host.line.receive(self._patience)) is None:
-                break
-            identifier, data = frame
-            motor = awaited.pop(identifier, None)
-            if motor is None:
-                self._take(frame)
-            elif not motor.take(data, requested):
-                awaited[identifier] = motor
-        if awaited:
-            self._judge(awaited.values())
+            if (frame := host.line.receive(max(0.0, min(patience, end - host.now())))) is None:
+                return
+            yield frame
+
+    def _owe(self) -> None:
+        """Positions are requested, by this host or another one; as many answers may come."""
+        for motor in self.motors:
+            motor.owed = min(motor.owed + 1, round(BUS.silent / self._period))
 
     def _poll(self) -> None:
         """Ask for the modes; that there was no answer to the last requests is a fault."""
         if not self._is_answered:
             self._fault(BusFault.SAFETY_SILENT)
-        self._is_answered = False
         self._poll_at = self._host.now() + BUS.poll
         for request in self._requests[:-1]:
             self._host.send(request)
+        self._is_answered = self._host.refused > 0  # then nothing is to be answered
 
-    def _take(self, frame: Frame) -> None:
-        """Take a frame that is no awaited position."""
-        found = frames.read(frame)
+    def _take(self, frame: Frame) -> frames.Value | None:
+        """Take a frame, and return what a node answers in it."""
+        found, motor = frames.read(frame), self._by_answer.get(frame.identifier)
         if frame.sender == HOST:
             if not self._host.line.slack:  # no echo
                 self._stray(BusFault.FOREIGN)
+                if frame.data == self._requests[-1].data:
+                    self._owe()
         elif found is None or found.node not in self._host.versions:
             self._host.counts["other frames"] += 1
-        elif found.number is None:
-            self._stray(BusFault.DOUBLED, found.node)
+        elif motor:
+            motor.owed -= 1
+            if motor.owed < 0:
+                motor.owed = 0
+                self._stray(BusFault.DOUBLED, motor.node)
         elif found.number == self._mode:
             self._take_mode(found.node, found.value)
         elif found.node == SAFETY:
             self._pendant, self._is_answered = found.value, True
+        return found
 
     def _take_mode(self, node: int, mode: int) -> None:
         if node == SAFETY:
@@ -124,7 +136,6 @@ class Cycle:
     def _judge(self, awaited: Collection[Motor]) -> None:
         """Look for motors whose positions have not come for too long."""
         self._host.counts["lost replies"] += len(awaited)
-        self._lost_at = self._host.now()
         for motor in awaited:
             motor.missed += 1
         silent = [motor for motor in awaited if motor.missed * self._period >= BUS.silent]
@@ -133,10 +144,8 @@ class Cycle:
         node = silent[0].node
         if self._host.refused:
             self._fault(BusFault.NOT_SENT, 0, self._host.refused)
-        elif len(silent) == len(self.motors):  # E-stop, power or cable, by what the safety module answers
-            mode = self._host.ask(SAFETY, "MODE", 1)
-            named: dict[int | None, BusFault] = {None: BusFault.NO_POWER, SafetyMode.ESTOP: BusFault.ESTOP}
-            self._fault(named.get(mode, BusFault.ALL_SILENT))
+        elif len(silent) == len(self.motors):
+            self._fault(self._host.silence(BusFault.ALL_SILENT))
         elif silent[0].has_jumped:
             self._fault(BusFault.JUMP, node)
         else:

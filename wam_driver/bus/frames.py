@@ -89,16 +89,11 @@ def position(node: int, count: int) -> Frame:
     return Frame(BusGroup.POSITIONS | node << 5, (count & 0x3FFFFF).to_bytes(3, "big"))
 
 
-def counts(data: bytes) -> int:
-    """Counts of the motor encoder in the answer of a controller; those of a joint encoder may come after them."""
-    return _signed(int.from_bytes(data[:3], "big"), 22)
-
-
 def read(frame: Frame) -> Value | None:
     """What a node has answered; None for any other frame."""
     to, data = frame.receiver, frame.data
-    if to == BusGroup.POSITIONS and len(data) in (3, 6):
-        return Value(frame.sender, None, counts(data))
+    if to == BusGroup.POSITIONS and len(data) in (3, 6):  # those of a joint encoder may come after them
+        return Value(frame.sender, None, _signed(int.from_bytes(data[:3], "big"), 22))
     if to == BusGroup.VALUES and len(data) in (4, 6) and data[0] & WRITE:
         return Value(frame.sender, data[0] & ~WRITE, written(frame))
     return None

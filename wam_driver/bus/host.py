@@ -62,6 +62,13 @@ class Host:
                     return found.value
         return None
 
+    def silence(self, otherwise: BusFault) -> BusFault:
+        """Why nothing answers, by what the safety module does."""
+        mode = self.ask(SAFETY, "MODE", 1)
+        if mode is None:
+            return BusFault.NO_POWER
+        return otherwise if mode else BusFault.ESTOP
+
     def demand(
         self, node: int, name: str, allowed: Container[int] | None = None, fault: BusFault = BusFault.MISSING
     ) -> int:
@@ -74,7 +81,9 @@ class Host:
         """
         found = self.ask(node, name)
         if found is None:
-            raise Trouble(BusFault.NO_SAFETY_MODULE if node == SAFETY else BusFault.MISSING, node)
+            if node == SAFETY:
+                raise Trouble(BusFault.NO_SAFETY_MODULE, node)
+            raise Trouble(self.silence(BusFault.MISSING), node)
         if allowed is not None and found not in allowed:
             raise Trouble(fault, node, found)
         return found

@@ -50,14 +50,16 @@ class CanLine:
         return True
 
     def receive(self, timeout: float) -> Frame | None:
-        """The next frame; None where none comes in time, s, or at an error of the bus."""
+        """The next frame of data; None where none comes in time, s, or the bus fails."""
+        end = self.now() + timeout
         try:
-            message = self._bus.recv(timeout)
-            if message is None or not message.is_error_frame:
-                return message and Frame(message.arbitration_id, bytes(message.data))
+            while message := self._bus.recv(max(0.0, end - self.now())):
+                if message.is_error_frame:
+                    self.counts["bus errors"] += 1
+                elif not (message.is_extended_id or message.is_remote_frame):  # those are none of this arm
+                    return Frame(message.arbitration_id, bytes(message.data))
         except self._errors:
-            pass
-        self.counts["bus errors"] += 1
+            self.counts["bus errors"] += 1
         return None
 
 

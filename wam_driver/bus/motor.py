@@ -2,7 +2,6 @@
 
 import math
 
-from wam_driver.bus.frames import counts
 from wam_driver.thresholds import BUS
 
 
@@ -21,13 +20,14 @@ class Motor:
     position, velocity : rad, rad/s; a position that is not known yet is NaN.
     current : that was sent, A.
     missed : periods since the last position, as the cycle counts them.
+    owed : answers to requests of a position that have not come.
     has_jumped : whether one was dropped since then.
     """
 
     def __init__(self, node: int, turn: int, gain: float, limit: int) -> None:
         self.node, self._step, self._gain, self._limit = node, math.tau / turn, gain, limit
         self.position, self.velocity, self.current = math.nan, 0.0, 0.0
-        self.missed, self.has_jumped = 0, False
+        self.missed, self.owed, self.has_jumped = 0, 0, False
         self._time = math.nan  # s, of the last position
 
     def count_at(self, angle: float) -> int:
@@ -40,12 +40,12 @@ class Motor:
         self.current = count / self._gain
         return count
 
-    def take(self, answer: bytes, time: float) -> bool:
-        """Take the position that its controller answers at a time, s, unless the motor cannot be there."""
-        position = counts(answer) * self._step
+    def take(self, count: int, time: float) -> bool:
+        """Take the position, counts, that its controller answers at a time, s, unless the motor cannot be there."""
+        position = count * self._step
         moved, dt = position - self.position, time - self._time
         if dt > 0.0:
-            if abs(moved) > BUS.jump and abs(moved) > BUS.jump * dt / BUS.silent:
+            if abs(moved) > BUS.jump * max(1.0, dt / BUS.silent):
                 self.has_jumped = True
                 return False
             self.velocity = moved / dt

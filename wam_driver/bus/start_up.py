@@ -92,7 +92,7 @@ class StartUp(Host):
         for node in self._motors:
             self.versions[node] = self.demand(node, "VERS")
             self.demand(node, "ROLE", BUS.motor_roles, BusFault.NOT_MOTOR)
-            for name in ("P", "T", "MODE"):
+            for name in ("P", "T"):  # MODE is the same in all
                 if self.number(node, name) != self.number(1, name):
                     raise Trouble(BusFault.MIXED_FIRMWARE, node, name)
         self.versions[BusGroup.MOTORS] = self.versions[1]
