@@ -30,8 +30,15 @@ def excess(watched: Iterable[WatchedLimit], cause: str, **values: Value) -> Even
     """The fault of the first quantity above its limit, or not a number, with further values; None where none is."""
     for one in watched:
         if not one.value <= one.limit:
-            names = {"quantity": one.quantity, "unit": one.unit, "where": one.where}
-            return fault(cause, value=one.value, allowed=one.limit, **names, **values)
+            return fault(
+                cause,
+                value=one.value,
+                allowed=one.limit,
+                quantity=one.quantity,
+                unit=one.unit,
+                where=one.where,
+                **values,
+            )
     return None
 
 

@@ -40,7 +40,7 @@ class Realtime:
         self._driver, self._timing, self._parameters = driver, driver.timing, driver.parameters
         self._publish, self._now = publish, now
         self._latencies: list[float] = []
-        self._published: deque[tuple[int, float]] = deque(maxlen=100)
+        self._sent: dict[int, float] = {}  # s on that clock, by stamp, since the last report
         self._done = self._missed = 0
         self._recent: deque[int] = deque()  # periods that were due at each tick in the window; all but one were late
         self._recent_done = 0
@@ -57,13 +57,10 @@ class Realtime:
 
     def take_currents(self, stamp: int, currents: list[float]) -> None:
         """Take the command that answers the state of `stamp`."""
-        now = self._now()
-        while self._published and self._published[0][0] < stamp:
-            self._published.popleft()
-        if self._published and self._published[0][0] == stamp:
-            self._latencies.append(now - self._published.popleft()[1])
         self._driver.command(stamp, currents)
-        self._progress = self.command_came = now
+        self._progress = self.command_came = now = self._now()
+        if sent := self._sent.pop(stamp, 0.0):
+            self._latencies.append(now - sent)
 
     def take_push(self, stamp: int) -> None:
         """Note a disturbance: in realtime nothing waits for it."""
@@ -120,10 +117,6 @@ class Realtime:
             "this computer is too busy or too slow for realtime; end other programs, or use lockstep"
         )
 
-    def _send(self) -> None:
-        self._published.append((self._driver.stamp, self._now()))
-        self._publish()
-
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
         now = self._now()
@@ -131,6 +124,10 @@ class Realtime:
         if now - self.command_came > self._parameters.watchdog:
             return "no motor_current_command arrives; start velocity_loop and its peers, then enable"
         return self.lateness if now - self._connected >= DRIVER.settling else ""
+
+    def _send(self) -> None:
+        self._sent[self._driver.stamp] = self._now()
+        self._publish()
 
     def pause(self, on: bool) -> None:
         """Stop the time, or let it go on."""
@@ -145,8 +142,8 @@ class Realtime:
 
     def facts(self) -> dict[str, str]:
         """For the diagnostics: latencies since the last report, late periods and rate since the start."""
-        latencies = sorted(self._latencies) or [math.nan]
-        self._latencies = []
+        latencies, self._latencies = sorted(self._latencies) or [math.nan], []
+        self._sent.clear()
         return {
             "latency p50 [us]": f"{latencies[len(latencies) // 2] * 1e6:.0f}",
             "latency p99 [us]": f"{latencies[int(len(latencies) * 0.99)] * 1e6:.0f}",
