@@ -40,10 +40,18 @@ class ArmDriver(StackNode):
     ----------
     safety : state of the brakes.
     session : that the other nodes follow.
+    warnings : what a person should know, though the arm may move.
+    unready : what the arm still lacks before it may be enabled, '' where nothing.
+    advice : what a person at the arm has to do for that, '' where nothing.
+    lateness : how many periods were late and what to do about it, '' where few were.
+    is_paused : whether the time of the arm is stopped.
     """
 
     is_first = True
     safety: Safety
+    warnings: tuple[str, ...] = ()
+    unready = advice = lateness = ""
+    is_paused = False
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration, **ros)
@@ -77,31 +85,6 @@ class ArmDriver(StackNode):
         """What speaks against a release of the brakes, when all else is well; '' where nothing does."""
         return ""
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a person should know, though the arm may move."""
-        return ()
-
-    @property
-    def unready(self) -> str:
-        """What the arm still lacks before it may be enabled, '' where nothing."""
-        return ""
-
-    @property
-    def advice(self) -> str:
-        """What a person at the arm has to do for that, '' where nothing."""
-        return ""
-
-    @property
-    def lateness(self) -> str:
-        """How many periods were late and what to do about it, '' where few were."""
-        return ""
-
-    @property
-    def is_paused(self) -> bool:
-        """Whether the time of the arm is stopped."""
-        return False
-
     # what every driver does
 
     def serve(self, name: str, kind: Any, answer: Callable[[Any], Answer]) -> None:
@@ -121,8 +104,7 @@ class ArmDriver(StackNode):
     def _reason(self) -> str:
         """What `enable` is refused for, '' where nothing."""
         rival = TWO_DRIVERS if self.count_publishers("motor_states") > 1 else ""
-        faults = "; ".join(f"{node}: {why}" for node, why in self.peers.faulty.items())
-        return self.health.problem or self.unready or rival or faults or self.obstacle()
+        return self.health.problem or self.unready or rival or self.peers.faults or self.obstacle()
 
     def disable(self) -> Answer:
         """Brake at once."""

@@ -2,8 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -37,8 +36,9 @@ class DriverNode(ArmDriver):
         self.serve("pause", SetBool, self._pause)
         self.serve("reset", Trigger, lambda _: self.driver.reset())
         self.serve("step", Trigger, lambda _: self._step())
-        self._try_post_mortem()
-        self.time: Lockstep | Realtime
+        if self._directory:  # a person is warned at the start, not at the fault
+            self._into_directory(lambda directory: tempfile.TemporaryFile(dir=directory).close())
+        self.time: Any  # Lockstep or Realtime
         if timing.mode == "lockstep":
             self.time = Lockstep(
                 self.driver,
@@ -48,6 +48,7 @@ class DriverNode(ArmDriver):
                 self.announce,
                 self.trip,
                 time.perf_counter,
+                lambda: self.peers.faults,
             )
             self.create_timer(DRIVER.watch, self._watch_lockstep)
             if timing.real_time_factor:
@@ -83,24 +84,24 @@ class DriverNode(ArmDriver):
         return self.time.obstacle()
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
         """What a person should know: what time does not begin without, else what is near a limit."""
         return (self.unready,) if self.time.start_overdue else tuple(self.driver.warnings)
 
     @property
-    def lateness(self) -> str:
+    def lateness(self) -> str:  # type: ignore[override]
         """How many periods were late and what to do about it, '' where few were."""
         return self.time.lateness
 
     @property
-    def is_paused(self) -> bool:
+    def is_paused(self) -> bool:  # type: ignore[override]
         """Whether the time of the arm is stopped."""
         return self.time.is_paused
 
     # the beginning
 
     @property
-    def unready(self) -> str:
+    def unready(self) -> str:  # type: ignore[override]
         """What the arm still lacks before the brakes may be released, '' where nothing."""
         if self.time.is_started:
             return ""
@@ -112,7 +113,6 @@ class DriverNode(ArmDriver):
         return isinstance(self.time, Realtime) and (bool(self.peers.absent) or self.time.settles())
 
     def _watch_lockstep(self) -> None:
-        assert isinstance(self.time, Lockstep)
         self.time.watch()
         if not self.time.is_started and self.health.is_ready and not self.peers.absent:
             self._begin()
@@ -166,28 +166,24 @@ class DriverNode(ArmDriver):
         """Write what came before a fault, where a directory is given."""
         if not self._directory:
             return
-        path = Path(self._directory) / f"post_mortem_{self.stamp}.csv"
         motors, recent = self.shared.arm.motors.names, self.driver.recent
         names = [f"{what} {motor}" for what in DriverSample._fields[1:] for motor in motors]
         rows = [",".join(["stamp", *names])]
         rows += [",".join(map(repr, (stamp, *chain(*values)))) for stamp, *values in recent]
-        with self._warning_of_failure():
-            path.parent.mkdir(parents=True, exist_ok=True)
+
+        def write(directory: Path) -> None:
+            path = directory / f"post_mortem_{self.stamp}.csv"
             path.write_text("\n".join(rows) + "\n", encoding="utf-8")
             self.get_logger().error(f"the last {len(recent)} samples are in {path}")
 
-    def _try_post_mortem(self) -> None:
-        """Warn at the start where the samples of a fault could not be written."""
-        if self._directory:
-            with self._warning_of_failure():
-                Path(self._directory).mkdir(parents=True, exist_ok=True)
-                tempfile.TemporaryFile(dir=self._directory).close()
+        self._into_directory(write)
 
-    @contextmanager
-    def _warning_of_failure(self) -> Iterator[None]:
-        """Warn where the directory cannot be written."""
+    def _into_directory(self, write: Callable[[Path], object]) -> None:
+        """Write into the directory, which is made; warn where that is not possible."""
+        directory = Path(self._directory)
         try:
-            yield
+            directory.mkdir(parents=True, exist_ok=True)
+            write(directory)
         except OSError as error:
             reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
             self.health.facts["post_mortem"] = reason

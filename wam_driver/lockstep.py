@@ -39,6 +39,7 @@ class Lockstep:
     announce : called to publish the session.
     stop : called with the reason, to stop the arm.
     now : steady clock, s.
+    faults : of nodes that still report one, and so may not answer, '' for none.
 
     Attributes
     ----------
@@ -55,6 +56,7 @@ class Lockstep:
         announce: Callable[[], None],
         stop: Callable[[Event], None],
         now: Callable[[], float],
+        faults: Callable[[], str] = str,
     ) -> None:
         timing = driver.timing
         self._driver, self._timing, self._interface = driver, timing, interface
@@ -62,7 +64,7 @@ class Lockstep:
         topics = ["motor_current_command", *["sim/disturbance"] * self._is_played]
         self._senders = {topic: " and ".join(interface.publishers(topic)) or "its publisher" for topic in topics}
         self._session, self._announce = session, announce
-        self._publish, self._stop, self._now = publish, stop, now
+        self._publish, self._stop, self._now, self._faults = publish, stop, now, faults
         self.pacer = Pacer(timing.real_time_factor, now)
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
@@ -135,6 +137,8 @@ class Lockstep:
 
     def _cause(self, missing: list[str]) -> str:
         """The node that is the reason, and what to do about it."""
+        if faults := self._faults():
+            return faults
         if silent := ", ".join(self._session.silent):
             return f"{silent} has stopped or is very slow; if it has stopped, start it, or 'wam up', again"
         found = self._interface.unanswered(missing, self._session.awaited)
@@ -175,11 +179,11 @@ class Lockstep:
         """For the diagnostics: the pace, where it is one; without a pace nothing depends on the wall clock."""
         if not self._timing.real_time_factor:
             return {}
-        pace = self.pacer.report()
+        factor, behind = self.pacer.report()
         return {
-            REAL_TIME_FACTOR: f"{pace.factor:.3f}",
-            BEHIND: f"{pace.behind * 1e3:.1f}",
-            SLIPS: str(pace.slips),
+            REAL_TIME_FACTOR: f"{factor:.3f}",
+            BEHIND: f"{behind * 1e3:.1f}",
+            SLIPS: str(self.pacer.slips),
         }
 
     @property

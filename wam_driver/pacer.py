@@ -1,25 +1,9 @@
 """The pace of simulated time: never ahead of the wall clock times a factor, slower where the machine is slower."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from wam_description.arm import seconds
 from wam_driver.thresholds import DRIVER
-
-
-class Pace(NamedTuple):
-    """How fast simulated time has passed since the last report.
-
-    Attributes
-    ----------
-    factor : simulated time per time of the wall clock.
-    behind : largest delay of a period, s of the wall clock.
-    slips : periods, since the start, that were more than `slack` late, so that the excess was forgotten.
-    """
-
-    factor: float
-    behind: float
-    slips: int
 
 
 class Pacer:
@@ -32,7 +16,7 @@ class Pacer:
 
     Attributes
     ----------
-    slips : periods that were more than `slack` late.
+    slips : periods that were more than `slack` late, so that the excess was forgotten.
     passed : simulated time and time of the wall clock while it passed, s; pauses do not count.
     """
 
@@ -69,9 +53,8 @@ class Pacer:
         """Time was stopped or stepped by hand: the next period is due at once, and what was missed is not made up."""
         self._last = None
 
-    def report(self) -> Pace:
-        """The pace since the last report."""
+    def report(self) -> tuple[float, float]:
+        """Simulated time per time of the wall clock, and largest delay of a period, s, since the last report."""
         simulated, elapsed = (now - then for now, then in zip(self.passed, self._reported, strict=True))
-        pace = Pace(simulated / elapsed if elapsed > 0.0 else 0.0, self._behind, self.slips)
-        self._reported, self._behind = self.passed, 0.0
-        return pace
+        behind, self._reported, self._behind = self._behind, self.passed, 0.0
+        return simulated / elapsed if elapsed > 0.0 else 0.0, behind

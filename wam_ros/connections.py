@@ -54,9 +54,9 @@ class Peers:
             self._absent.discard(status.node)
 
     @property
-    def faulty(self) -> dict[str, str]:
-        """Present faults by node."""
-        return {node: status.fault for node, status in sorted(self.statuses.items()) if status.fault}
+    def faults(self) -> str:
+        """Present faults in words, '' for none."""
+        return "; ".join(f"{node}: {status.fault}" for node, status in sorted(self.statuses.items()) if status.fault)
 
     def held_up(self, nodes: Collection[str]) -> str:
         """The long step of another node, or of one of this process, that holds up these nodes, '' for none."""

@@ -127,7 +127,7 @@ def test_the_driver_brakes_by_name_where_a_node_reports_a_fault(name: str, ros: 
     answer = request(ros, SetBool, "driver/enable", data=True)
     assert (answer.success, f"{name}: unexpected ValueError" in answer.message) == (False, True)
     sender.publish(diagnostic_status(NodeStatus(Level.OK, "ready", name), "wam"))
-    ros.wait(lambda: not driver.peers.faulty)
+    ros.wait(lambda: not driver.peers.faults)
 
 
 def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any, tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
     gravity.node._body = body
     state.header = header(10_000_000)
     sender.publish(state)
-    ros.wait(lambda: not driver.peers.faulty, what="the node is well again")
+    ros.wait(lambda: not driver.peers.faults, what="the node is well again")
     assert gravity.health.counts["steps"] == 2
 
 

@@ -75,14 +75,14 @@ class BusDriver(ArmDriver):
         self.announce()
 
     @property
-    def advice(self) -> str:
+    def advice(self) -> str:  # type: ignore[override]
         """What a person has to do."""
         return self.hardware.advice
 
     unready = advice
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
         """The same, where there is something to do; else what is near a limit."""
         return (self.advice,) if self.advice else self._near
 
