@@ -105,14 +105,14 @@ def run_together(
     stop: Stop,
     before_end: Callable[[], object],
 ) -> str:
-    """Run the nodes of a configuration as this process; see `Processes` and `run`."""
-    _require_start(configuration, namespace)
+    """Run the nodes of a configuration, after `require_start`, as this process; see `Processes` and `run`."""
     makers = node_makers(configuration.shared.nodes)
     with parameter_file(configuration) as file:
         return run(makers, ["wam", *_arguments(str(file), namespace, log_level)], stop, before_end)
 
 
-def _require_start(configuration: Configuration, namespace: str) -> None:
+def require_start(configuration: Configuration, namespace: str) -> None:
+    """Refuse nodes of which one already runs, and values that are not allowed, before any starts."""
     require_places([declared(entry).name for entry in configuration.shared.nodes], namespace)
     require_parameters(configuration)
 
@@ -148,7 +148,7 @@ class Processes(Closing):
         log_level: str = "info",
         processes: str = EACH,
     ) -> None:
-        _require_start(configuration, namespace)
+        require_start(configuration, namespace)
         self.killed: list[str] = []
         groups = placed_groups(configuration.shared, processes)
         started = [NodeProcess(configuration, group, namespace, log_level, place) for group, place in groups]

@@ -206,8 +206,8 @@ class AdaptedNode(StackNode):
             if step := self.peers.held_up({*stopped, self.get_name()}):
                 problem = fault("long_step", step=step, topics=topics)
             elif self._began - ended < NODE_LIMITS.long_step_recent:
-                late = {"time": pause, "allowed": self.shared.ages.feedback}
-                problem = fault("node_late", what="node", cure="end other programs if the computer is busy", **late)
+                cure, allowed = "end other programs if the computer is busy", self.shared.ages.feedback
+                problem = fault("node_late", what="node", time=pause, allowed=allowed, cure=cure)
             health.set_problem("inputs", problem)
 
     # what the other nodes report, live parameters, requests

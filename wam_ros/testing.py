@@ -266,7 +266,8 @@ class RunningArm:
             self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
 
     def run(self, seconds: float) -> None:
-        """Spin for a time of the arm, s."""
+        """Spin for a time of the arm, s, from now on."""
+        assert seconds >= 0.0, f"the arm's time does not go back by {-seconds:g} s"
         end = self.stamp + round(seconds * SECOND)
         self.run_until(lambda: self.stamp >= end, seconds + 1.0)
         self._look()

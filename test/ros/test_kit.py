@@ -225,6 +225,8 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
         arm.run_until(lambda: False, 0.1)
     with pytest.raises(AssertionError, match=r"0\.1 s of .*: a fault of the driver; "):
         arm.run_until_fault(0.1)
+    with pytest.raises(AssertionError, match="does not go back by 1 s"):
+        arm.run(-1.0)
 
 
 @pytest.mark.parametrize(
@@ -235,6 +237,7 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
         ({"timing": {"period": -1.0}}, "period"),
         ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you set.*damping.*gan"),
         ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
+        ({"driver": {"sensors.encoder_noise": [0.0] * 9}}, "it needs 4"),  # by the node itself
     ],
 )
 def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text: str, arm: RunningArm) -> None:
@@ -251,14 +254,11 @@ def test_a_stack_that_has_ended_has_no_truth_and_is_not_started_again(arm: Runni
         _ = arm.truth
 
 
-def test_a_scenario_that_fails_is_an_exception(arm: RunningArm) -> None:
-    with pytest.raises(ArmFault, match="driver refuses"):
-        arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])
-
-
-def test_steps_that_no_file_can_contain_are_refused(arm: RunningArm) -> None:
+def test_a_scenario_that_fails_is_an_exception_and_so_are_steps_that_no_file_can_contain(arm: RunningArm) -> None:
     with pytest.raises(ParameterError, match=r"the steps contain <object.*; give mappings as a scenario file has"):
         arm.play([object()])  # type: ignore[list-item]
+    with pytest.raises(ArmFault, match="driver refuses"):
+        arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])
 
 
 def test_nested_values_and_a_class_in_the_place_of_a_node_make_a_configuration() -> None:

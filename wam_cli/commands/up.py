@@ -23,7 +23,7 @@ from wam_control.task.scenario import load_for
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
 from wam_description.nodes import ONE
-from wam_ros.bring_up import Processes, process_of, run_together
+from wam_ros.bring_up import Processes, process_of, require_start, run_together
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_ros.run import die_with_parent
 
@@ -65,15 +65,11 @@ def run(given: argparse.Namespace) -> int:
                 f"{given.scenario}: step '{pushing}' has a push, but the driver of this arm cannot push; leave out the "
                 "key push (a real arm can be pushed by hand)"
             )
-    stop = Stop()
-    ended = run_nodes(configuration, given, stop, f"{len(configuration.shared.nodes)} nodes in")
-    is_played = False
+    ended = run_nodes(configuration, given, Stop(), f"{len(configuration.shared.nodes)} nodes in")
     for process, code in ended.codes.items():
-        is_scenario = "scenario" in process.split(", ")
-        is_played |= is_scenario
-        who = "the scenario" if is_scenario else process_of(process)
+        who = "the scenario" if "scenario" in process.split(", ") else process_of(process)
         print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
-    if given.scenario and is_played and not any(ended.codes.values()):
+    if given.scenario and ended.codes and not any(ended.codes.values()):
         seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
         print(f"to see whether its commands were carried out: {seen}")
     if ended.failure:
@@ -99,6 +95,7 @@ def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Sto
     started : printed before the names of the processes; '' for nothing.
     """
     processes = processes_of(configuration, given)
+    require_start(configuration, given.namespace)
     with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
         if processes == ONE:
             if started:
@@ -107,12 +104,11 @@ def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Sto
             names = ", ".join(declared(entry).name for entry in configuration.shared.nodes)
             return Ended({} if stop.is_set else {names: int(bool(failure))}, failure)
         with Processes(configuration, given.namespace, given.log_level, processes) as stack:
-            each = stack.processes
             if started and not stop.is_set:
+                each = stack.processes
                 print(f"{started} {len(each)} processes ({'; '.join(each)}); Ctrl-C stops them", flush=True)
             codes = stack.wait(lambda ended: stop.is_set or bool(ended))
-            failures = stack.failures
-            for failure in failures:  # before the others end and print what follows from it
+            for failure in (failures := stack.failures):  # before the others end and print what follows from it
                 print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
             close_page()
         return Ended(codes, stack.bag_failure, failures, stack.killed)
