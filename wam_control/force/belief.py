@@ -81,11 +81,6 @@ class WorldTorques(NamedTuple):
     sd: Array
 
 
-def tolerance(desired: float, own: ForceLoopParameters) -> float:
-    """Error, N, up to which a force of this size, N, counts as reached."""
-    return own.limits.tolerance * abs(desired)
-
-
 def predicted(
     axis: CommandedAxis, torque_sd: Array, own: ForceLoopParameters, resting: float = 0.0, shaking: float = 0.0
 ) -> Errors:
@@ -152,4 +147,4 @@ def belief(
         sd = math.hypot(errors.torques, errors.friction, errors.place)
         if axis.desired and sd < math.inf:  # friction and position are known per force
             chi2 = sensed.unexplained(torques.now) / max(1.0, force / axis.desired) ** 2
-    return Belief(force, before, sd, chi2, errors, tolerance(size, own))
+    return Belief(force, before, sd, chi2, errors, own.limits.tolerance * size)

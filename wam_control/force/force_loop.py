@@ -15,7 +15,7 @@ import numpy as np
 
 from wam_control.force.advice import Search, tries
 from wam_control.force.axes import CommandedAxis, TaskAxes
-from wam_control.force.belief import Belief
+from wam_control.force.belief import Belief, Errors
 from wam_control.force.command_run import AxisRun, CommandRun
 from wam_control.force.contact_place import ContactPlace, pinned_position
 from wam_control.force.force_axis import ForceAxes, ForcePlace
@@ -269,6 +269,9 @@ class ForceLoop:
         run.judge(q, self._measurement, forces, own.sensing.zero_limit)
         for one in run.axes:
             one.known = self._knowledge.of(q, one.on_links)
+            # a held arm has not left what it touched, also where that is not estimated any more
+            if one.of.position is None and one.touch.has_been and run.held_at is not None and not contact.cover:
+                one.known = one.known._replace(errors=Errors(place=math.inf))
         run.move(self._moved, forces, q)
         found = [holding(Code.REFUSED, "moved_fast", speed=FORCE.slow)] if run.is_moving else []
         is_led = bool(given.rate) or not all(one.now.is_force for one in run.axes)

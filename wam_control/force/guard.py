@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.belief import tolerance
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of, torque_law
 from wam_control.force.problem import linear
@@ -96,7 +95,7 @@ class Supervision:
             for q in postures
             for each in guard.contacts(q, own.contact_cover, own.contact_position, own.contact_position_sd)
             # what is not known well enough is refused
-            if guard.axis(each).force_sd <= own.limits.doubt * tolerance(each.force, own)
+            if guard.axis(each).force_sd <= own.limits.doubt * own.limits.tolerance * each.force
         )
         task = task_of(own)
         found = guard.assess(task, contacts)
