@@ -40,18 +40,10 @@ class ArmDriver(StackNode):
     ----------
     safety : state of the brakes.
     session : that the other nodes follow.
-    warnings : what a person should know, though the arm may move.
-    unready : what the arm still lacks before it may be enabled, '' where nothing.
-    advice : what a person at the arm has to do for that, '' where nothing.
-    lateness : how many periods were late and what to do about it, '' where few were.
-    is_paused : whether the time of the arm is stopped.
     """
 
     is_first = True
     safety: Safety
-    warnings: tuple[str, ...] = ()
-    unready = advice = lateness = ""
-    is_paused = False
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration, **ros)
@@ -84,6 +76,31 @@ class ArmDriver(StackNode):
     def obstacle(self) -> str:
         """What speaks against a release of the brakes, when all else is well; '' where nothing does."""
         return ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know, though the arm may move."""
+        return ()
+
+    @property
+    def unready(self) -> str:
+        """What the arm still lacks before it may be enabled, '' where nothing."""
+        return ""
+
+    @property
+    def advice(self) -> str:
+        """What a person at the arm has to do for that, '' where nothing."""
+        return ""
+
+    @property
+    def lateness(self) -> str:
+        """How many periods were late and what to do about it, '' where few were."""
+        return ""
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the time of the arm is stopped."""
+        return False
 
     # what every driver does
 

@@ -38,7 +38,7 @@ class DriverNode(ArmDriver):
         self.serve("step", Trigger, lambda _: self._step())
         if self._directory:  # a person is warned at the start, not at the fault
             self._into_directory(lambda directory: tempfile.TemporaryFile(dir=directory).close())
-        self.time: Any  # Lockstep or Realtime
+        self.time: Lockstep | Realtime
         if timing.mode == "lockstep":
             self.time = Lockstep(
                 self.driver,
@@ -84,24 +84,24 @@ class DriverNode(ArmDriver):
         return self.time.obstacle()
 
     @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+    def warnings(self) -> tuple[str, ...]:
         """What a person should know: what time does not begin without, else what is near a limit."""
         return (self.unready,) if self.time.start_overdue else tuple(self.driver.warnings)
 
     @property
-    def lateness(self) -> str:  # type: ignore[override]
+    def lateness(self) -> str:
         """How many periods were late and what to do about it, '' where few were."""
         return self.time.lateness
 
     @property
-    def is_paused(self) -> bool:  # type: ignore[override]
+    def is_paused(self) -> bool:
         """Whether the time of the arm is stopped."""
         return self.time.is_paused
 
     # the beginning
 
     @property
-    def unready(self) -> str:  # type: ignore[override]
+    def unready(self) -> str:
         """What the arm still lacks before the brakes may be released, '' where nothing."""
         if self.time.is_started:
             return ""
@@ -113,6 +113,7 @@ class DriverNode(ArmDriver):
         return isinstance(self.time, Realtime) and (bool(self.peers.absent) or self.time.settles())
 
     def _watch_lockstep(self) -> None:
+        assert isinstance(self.time, Lockstep)
         self.time.watch()
         if not self.time.is_started and self.health.is_ready and not self.peers.absent:
             self._begin()

@@ -75,14 +75,14 @@ class BusDriver(ArmDriver):
         self.announce()
 
     @property
-    def advice(self) -> str:  # type: ignore[override]
+    def advice(self) -> str:
         """What a person has to do."""
         return self.hardware.advice
 
     unready = advice
 
     @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+    def warnings(self) -> tuple[str, ...]:
         """The same, where there is something to do; else what is near a limit."""
         return (self.advice,) if self.advice else self._near
 
