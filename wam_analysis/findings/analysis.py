@@ -186,8 +186,9 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
         for sentence in section.shows
     ]
     right = [(f"{one}.", "Steps") for one in verdict(recording) if one.result is VerdictResult.YES]
-    moved = [one for one in sections if one.key == "stick_slip" and one.findings]
-    shows = shows or right or [(sentence, one.title) for one in moved for sentence in one.sentences]
+    # that joints moved, or that nothing vibrated
+    rest = [one for one in sections if one.key == ("stick_slip" if one.findings else "frequency")]
+    shows = shows or right or [(sentence, one.title) for one in rest for sentence in one.sentences]
     problems = _line("Problems", wrong, "none found.")
     return Section("verdict", "Verdict", (what, problems, _line("Shows", shows, "nothing that can be evaluated.")))
 
