@@ -83,7 +83,8 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
     "ratios of a gimbal",
     "counts": "motor controller {node} has {detail} counts per turn; allowed: 4096 or 40960",
     "gain": "motor controller {node} has {detail}; correct its property IPNM",
-    "limit": "the largest torque (property MT) of motor controller {node} is {detail}; it must be above 0",
+    "limit": "the largest torque (property MT, or TL1 of the safety module) of node {node} is {detail}; it must be "
+    "above 0",
     "index": "motor controller {node} would take the torque of another motor; correct its property {detail}",
     "not_zeroed": "motor controller {node} is at {detail} counts, not those of the home pose; start there again",
     "no_reply": "motor controller {node} sends no position; check its cable",

@@ -348,6 +348,7 @@ AT_START: dict[str, tuple[Inject, BusFault]] = {
     "wrong counts": (setting(1024, "CTS"), BusFault.COUNTS),
     "wrong gain": (setting(500, "IPNM"), BusFault.GAIN),
     "no torque": (setting(0, "MT"), BusFault.LIMIT),
+    "no torque by the safety module": (setting(0, "TL1", node=10), BusFault.LIMIT),
     "wrong index": (setting(9, "PIDX"), BusFault.INDEX),
     "wrong group": (setting(5, "GRPC"), BusFault.INDEX),
     "E-stop as it starts": (estop_as_it_starts, BusFault.ESTOP),

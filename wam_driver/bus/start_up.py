@@ -17,6 +17,8 @@ from wam_driver.bus.motor import Motor
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.thresholds import BUS
 
+TORQUES = range(1, 1 << 31)  # counts, that a limit of the torque may be
+
 
 class Wait(Enum):
     """What the start waits for, as a text for the person at the arm."""
@@ -65,7 +67,7 @@ class StartUp(Host):
             for what in ("DEF", "LOAD"):
                 self.write(SAFETY, what, self.number(SAFETY, name))
         yield from self._wake()
-        limit = min(self.demand(SAFETY, "TL1"), BUS.largest_torque)
+        limit = min(self.demand(SAFETY, "TL1", TORQUES, BusFault.LIMIT), BUS.largest_torque)
         motors = [self._read(node, limit) for node in self._motors]
         if self.woken or self.demand(SAFETY, "ZERO") != 1:
             while not self.is_at_home:
@@ -122,7 +124,7 @@ class StartUp(Host):
         usual = range(int(maker["IPNM"] / BUS.gain_ratio), int(maker["IPNM"] * BUS.gain_ratio))
         if (gain := demand(node, "IPNM")) not in usual:
             raise Trouble(BusFault.GAIN, node, f"{gain} counts per N m; allowed: {usual[0]} to {usual[-1]}")
-        most = demand(node, "MT", range(1, 1 << 31), BusFault.LIMIT)
+        most = demand(node, "MT", TORQUES, BusFault.LIMIT)
         return Motor(node, turn, gain * self._constant[node - 1], min(most, limit))
 
     def _set_zero(self, motors: Sequence[Motor]) -> None:
