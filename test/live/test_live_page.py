@@ -414,6 +414,7 @@ def test_a_scenario_is_played_into_a_running_stack_and_a_wrong_one_is_refused(
         player = shown.page.shown.player
         shown.wait(lambda: player._node, spin)
         (node := player._node).send_signal(signal.SIGSTOP)
+        shown.wait(lambda: " T " in Path(f"/proc/{node.pid}/stat").read_text(), spin)
         panel.requests.put(Play(""))
         panel.requests.put(Call("driver", "estop"))
         shown.wait(lambda: mode_of(shown) == "fault", spin)

@@ -33,6 +33,7 @@ class Cycle:
         self.safety_mode: int = SafetyMode.IDLE
         self._patience = BUS.collect * period + host.line.slack
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
+        self._was_released = False  # when the modes were requested last
         self._torque, self._mode = host.number(BusGroup.MOTORS, "T"), host.number(BusGroup.MOTORS, "MODE")
         # the pendant first: it states why the mode changes
         requested = (SAFETY, "PEN"), (SAFETY, "MODE"), (BusGroup.MOTORS, "MODE"), (BusGroup.MOTORS, "P")
@@ -97,7 +98,7 @@ class Cycle:
         """Ask for the modes; that there was no answer to the last requests is a fault."""
         if not self._is_answered:
             self._fault(BusFault.SAFETY_SILENT)
-        self._poll_at = self._host.now() + BUS.poll
+        self._poll_at, self._was_released = self._host.now() + BUS.poll, self.is_released
         for request in self._requests[:-1]:
             self._host.send(request)
         self._is_answered = self._host.refused > 0  # then nothing is to be answered
@@ -128,6 +129,8 @@ class Cycle:
             self._is_answered, self.safety_mode = True, mode
             if self.is_released and mode != SafetyMode.ACTIVE:
                 self._fault(BusFault.SAFETY_IDLE if mode == SafetyMode.IDLE else BusFault.ESTOP)
+        elif self._was_released != self.is_released:
+            return  # it answers a request from before the change
         elif self.is_released and mode != BUS.torque_mode:
             self._fault(BusFault.CONTROLLER_IDLE, node, mode)
         elif not self.is_released and mode != BUS.idle_mode:  # as after Shift-Activate
