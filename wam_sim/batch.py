@@ -113,19 +113,21 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     workers : number; None for one per core.
     """
     count = workers or os.cpu_count() or 1
-    # workers inherit the mask: only this process handles what a terminal sends to all of them, Ctrl-C or its own end
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_worker)
+    # workers inherit the mask: only this process handles what a terminal sends to all of them, Ctrl-C or its own end;
+    # after the pool, which starts a process that undoes it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     for _ in range(count):
         pool.submit(os.getpid)
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:
         yield pool
     except BaseException:
+        # Python 3.11 may keep this end open, and then waits indefinitely until somebody reads what is on its way; newer
+        # ones close it, too, when the workers have ended
+        pool._call_queue._reader.close()  # type: ignore[attr-defined]
         for worker in pool._processes.values():
             worker.kill()
-        # Python before 3.12 keeps this end open, and then waits indefinitely until somebody reads what is on its way
-        pool._call_queue._reader.close()  # type: ignore[attr-defined]
         raise
     finally:
         pool.shutdown(cancel_futures=True)
