@@ -113,17 +113,12 @@ class AnalysedRecording:
         /right/joint_states, neither has that of the other.  What a controller reports with its command does not count.
         """
         own = [
-            one
-            for one in self.commands
-            if one.name == source.name
-            and (source.is_joint or source.shares_frame(one))
-            and not any(
-                two.name == source.name
-                and f"{two.topic} {COMMAND}" != one.topic
-                and shared_parts(one, source) < shared_parts(one, two)
-                for two in self.states
-            )
+            one for one in self.commands if one.name == source.name and (source.is_joint or source.shares_frame(one))
         ]
+        for one in tuple(own):
+            others = (two for two in self.states if two.name == source.name and f"{two.topic} {COMMAND}" != one.topic)
+            if shared_parts(one, source) < max((shared_parts(one, two) for two in others), default=0):
+                own.remove(one)
         return max(own, key=lambda one: shared_parts(one, source), default=None)
 
     # the run

@@ -161,15 +161,17 @@ class _Copy:
                 writer.flush()  # a chunk stays one
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             file.define(opcode, file.content(record))
-        elif opcode in (Opcode.ATTACHMENT, Opcode.METADATA):
-            item = parsed(opcode, file.content(record))
+        elif opcode == Opcode.ATTACHMENT:
+            attachment = parsed(opcode, file.content(record))
             writer.flush()
-            if opcode == Opcode.ATTACHMENT:
-                writer.attach(item)
-            elif item.name == REPAIRED:
-                self._earlier |= item.metadata
-            else:
-                writer.metadata(item.name, item.metadata)
+            writer.attach(attachment)
+        elif opcode == Opcode.METADATA:
+            metadata = parsed(opcode, file.content(record))
+            if metadata.name == REPAIRED:
+                self._earlier |= metadata.metadata
+                return
+            writer.flush()
+            writer.metadata(metadata.name, metadata.metadata)
 
     def _add(self, messages: Sequence[Message]) -> None:
         """Write messages; holes that are open end before them."""

@@ -40,6 +40,7 @@ class Pusher:
         mocap = int(model.body(self.name).mocapid[0])
         self._position, self._quaternion = data.mocap_pos[mocap], data.mocap_quat[mocap]
         self._away = model.body(self.name).pos.copy()
+        self._is_away = True
         cover = next(one for one in rows(arm.covers) if one.name == given.cover)
         start, end = np.array(cover.start), np.array(cover.end)
         self._slope = (end - start) / (end[0] - start[0])  # of the tube's axis, per position along x
@@ -56,8 +57,11 @@ class Pusher:
         data, given = self._data, self._given
         since = time - given.begin
         if not given.begin - given.rise <= time <= given.end + given.rise:
-            self._position[:], self.is_pressing = self._away, False
+            if not self._is_away:
+                self._position[:] = self._away
+                self._is_away, self.is_pressing = True, False
             return
+        self._is_away = False
         depth, sinking = self.depth(time)
         self.is_pressing = depth > 0.0
         force, across = self._directions(given.angle + given.turn * since)

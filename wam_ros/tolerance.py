@@ -110,14 +110,18 @@ class TolerantNode(LeavingNode):
         self._exception_time = time.monotonic()
         if self._exception_fault:
             return
-        text = raised(error)
-        text = f"unexpected {text}, after {what}; correct it, or report it with the log of node {self.get_name()}"
-        text = error.what if isinstance(error, UnusableOutput) else text
-        self._exception_fault = printable(text, NODE_LIMITS.exception_length)
+        self._exception_fault = printable(self._described(what, error), NODE_LIMITS.exception_length)
         trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * NODE_LIMITS.exception_length, "\n")
         self.get_logger().error(f"{self._exception_fault}\n{trace}")
         self._exception_timer = self.create_timer(NODE_LIMITS.fault_held, self._look_for_end)
         self.take_fault(self._exception_fault)
+
+    def _described(self, what: str, error: Exception) -> str:
+        """What a callback raised, with the line of the code, and what to do."""
+        if isinstance(error, UnusableOutput):
+            return error.what
+        text = raised(error)
+        return f"unexpected {text}, after {what}; correct it, or report it with the log of node {self.get_name()}"
 
     def _look_for_end(self) -> None:
         """Report that the fault is over, when callbacks have gone well for a while."""

@@ -102,6 +102,7 @@ def analyse(
     ValueError
         if it has not what is given.
     """
+    series: Mapping[str, Any] | None
     if isinstance(source, (str, Path)):
         path = Path(source)
         progress(f"reading {path}")
@@ -146,10 +147,11 @@ def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
 
 def _is_own(found: Bag) -> bool:
     """Whether a bag is of this stack: by what its recorder left in it, or by its topics."""
+    if PARAMETERS in found.attachments or RECORDING in found.metadata:
+        return True
     spaces = [name[: -len(own)] for name, one in found.types.items() for own, kind in OWN_TOPICS.items()
               if name.endswith(f"/{own}") and one == kind]  # fmt: skip
-    is_recorded = PARAMETERS in found.attachments or RECORDING in found.metadata
-    return is_recorded or any(spaces.count(space) > 1 for space in spaces)
+    return any(spaces.count(space) > 1 for space in spaces)
 
 
 def analyse_bag(

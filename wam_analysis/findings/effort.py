@@ -99,8 +99,8 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
 
 def limited(source: Source, quantity: str = "effort") -> str:
     """That a quantity stays at its bounds for long, which none with its noise does; '' where it does not."""
-    value = source.only(quantity).values.get(quantity, np.zeros(1))
-    bounds = float(np.min(value)), float(np.max(value))
+    value = source.only(quantity).values.get(quantity, np.zeros(0))
+    bounds = (float(np.min(value, initial=math.inf)), float(np.max(value, initial=-math.inf)))
     share = float(np.mean(np.isin(value, bounds) & (value != 0.0))) if bounds[0] < bounds[1] else 0.0  # 0 is off
     if share < SHAFT.limited:
         return ""

@@ -74,17 +74,16 @@ class Section(NamedTuple):
 
 def deviations(findings: Sequence[Finding]) -> tuple[str, ...]:
     """A sentence on the numbers that differ by more than three standard errors from their predictions, or none."""
-    found = sorted(
-        (one for one in findings if one.deviates),
-        key=lambda one: -abs(one.measured - one.predicted) / max(abs(one.predicted), 1e-300),
-    )
+    found = [one for one in findings if one.deviates]
+    if not found:
+        return ()
+    found.sort(key=lambda one: -abs(one.measured - one.predicted) / max(abs(one.predicted), 1e-300))
     words = [
         f"{one.name} {shown(one.measured)} +- {shown(one.error, one.unit)}, predicted {shown(one.predicted)}"
         for one in found[: LAYOUT.stated]
     ]
     more = f"; and {len(found) - len(words)} more" * (len(found) > len(words))
-    text = f"More than {SHAFT.sigmas:g} standard errors from the prediction: {'; '.join(words)}{more}."
-    return (text,) if words else ()
+    return (f"More than {SHAFT.sigmas:g} standard errors from the prediction: {'; '.join(words)}{more}.",)
 
 
 def shown(value: float, unit: str = "") -> str:

@@ -174,7 +174,13 @@ def cycle_section(recording: AnalysedRecording) -> Section:
 def _fate(one: HeldForce) -> tuple[str, bool]:
     """A sentence on whether the force settles, and whether it, or a shaft, swings on."""
     if one.swinging is None:
-        return f"{one.hold.name}: not controlled, not touching, or not recorded; its stability is not known.", False
+        silent = (
+            "nothing was touched"
+            if len(one.true) or len(one.measured)
+            else "neither the force nor a motor or joint was recorded"
+        )
+        why = "it was not controlled" if one.hold.is_refused else silent
+        return f"{one.hold.name}: {why}; its stability is not known.", False
     (shaft, seen), cycle = one.swinging, one.cycle
     is_cycle = cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded
     if is_cycle and seen.verdict is not Verdict.DIVERGED:

@@ -135,7 +135,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
     accuracy = {name: _accuracy(force[at >= steady] - hold.commanded) for name, (at, force) in signals.items()}
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
-    cycles = (_cycle(at[at >= late], force[at >= late], dither) for at, force in [*signals.values()][:2])
+    cycles = (_cycle(at[at >= late], force[at >= late], dither) for at, force in (signals["true"], signals["measured"]))
     return held._replace(
         response=response,
         touched=touched,

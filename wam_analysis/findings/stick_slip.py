@@ -25,9 +25,9 @@ def stick_section(recording: AnalysedRecording) -> Section:
         found = sticking(one, recording.command_of(one), least) if one.is_joint else None
         if found is None:
             continue
-        moved = float(np.ptp(one.only("position").values.get("position", np.zeros(1))))
-        if not found.begins and found.shortest and moved > SHAFT.joint_rest * SHAFT.way:
-            far = shown(moved, one.units["position"])
+        position = one.only("position").values.get("position", np.zeros(1))
+        if not found.begins and found.shortest and np.ptp(position) > SHAFT.joint_rest * SHAFT.way:
+            far = shown(float(np.ptp(position)), one.units["position"])
             slow = f"{shown(found.slowest or least)} {one.units['position']}/s"
             alike[f"moved by {far}, more slowly than {slow}, or too briefly"].append(one.label)
             continue

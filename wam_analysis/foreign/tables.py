@@ -32,7 +32,7 @@ RENAMED = (
 WRENCH = ("force", "torque")  # quantities along x, y and z
 
 
-def series_of_csv(path: Path) -> Mapping[str, Any]:
+def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     """Columns of a CSV file, as text, by their titles; the delimiter is the one that the titles have.
 
     Raises

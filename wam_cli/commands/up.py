@@ -66,10 +66,13 @@ def run(given: argparse.Namespace) -> int:
                 "key push (a real arm can be pushed by hand)"
             )
     ended = run_nodes(configuration, given, Stop(), f"{len(configuration.shared.nodes)} nodes in")
+    is_played = False
     for process, code in ended.codes.items():
-        who = "the scenario" if "scenario" in process.split(", ") else process_of(process)
+        is_scenario = "scenario" in process.split(", ")
+        is_played |= is_scenario
+        who = "the scenario" if is_scenario else process_of(process)
         print(f"{who} has {'failed' if code else 'ended'}, so all nodes were stopped")
-    if given.scenario and ended.codes and not any(ended.codes.values()):
+    if given.scenario and is_played and not any(ended.codes.values()):
         seen = f"wam analyse {shlex.quote(str(bag))} --steps" if given.record else "play it with --record"
         print(f"to see whether its commands were carried out: {seen}")
     if ended.failure:
@@ -95,9 +98,9 @@ def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Sto
     started : printed before the names of the processes; '' for nothing.
     """
     processes = processes_of(configuration, given)
-    require_start(configuration, given.namespace)
     with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
         if processes == ONE:
+            require_start(configuration, given.namespace)
             if started:
                 print(f"{started} this process; Ctrl-C stops them", flush=True)
             failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)
@@ -108,7 +111,8 @@ def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Sto
                 each = stack.processes
                 print(f"{started} {len(each)} processes ({'; '.join(each)}); Ctrl-C stops them", flush=True)
             codes = stack.wait(lambda ended: stop.is_set or bool(ended))
-            for failure in (failures := stack.failures):  # before the others end and print what follows from it
+            failures = stack.failures
+            for failure in failures:  # before the others end and print what follows from it
                 print(f"error: {failure}; the other nodes are stopped now", file=sys.stderr, flush=True)
             close_page()
         return Ended(codes, stack.bag_failure, failures, stack.killed)

@@ -44,13 +44,13 @@ class Cycle:
         """Let the controllers idle, or follow their torques, which are zero first."""
         self.is_released = not on
         self.command([0.0] * len(self.motors))
-        self._host.send(frames.put(BusGroup.MOTORS, self._mode, BUS.idle_mode if on else BUS.torque_mode))
+        self._host.put(BusGroup.MOTORS, "MODE", BUS.idle_mode if on else BUS.torque_mode)
 
     def stop(self) -> None:
         """Brake, and let the safety module go to idle where its firmware takes that from the host."""
         self.brake(True)
         if self.safety_mode == SafetyMode.ACTIVE and self._host.versions[SAFETY] >= BUS.settable_version:
-            self._host.send(frames.put(SAFETY, self._host.number(SAFETY, "MODE"), SafetyMode.IDLE))
+            self._host.put(SAFETY, "MODE", SafetyMode.IDLE)
             self.safety_mode = SafetyMode.IDLE  # until it answers otherwise
 
     def command(self, currents: Sequence[float]) -> None:

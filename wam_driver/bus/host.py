@@ -7,6 +7,7 @@ from wam_driver.bus import frames, properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.frames import SAFETY, Frame
 from wam_driver.bus.line import Line, incoming
+from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.thresholds import BUS
 
 
@@ -67,7 +68,7 @@ class Host:
         mode = self.ask(SAFETY, "MODE", 1)
         if mode is None:
             return BusFault.NO_POWER
-        return otherwise if mode else BusFault.ESTOP
+        return BusFault.ESTOP if mode == SafetyMode.ESTOP else otherwise
 
     def demand(
         self, node: int, name: str, allowed: Container[int] | None = None, fault: BusFault = BusFault.MISSING
@@ -88,7 +89,11 @@ class Host:
             raise Trouble(fault, node, found)
         return found
 
-    def write(self, node: int, name: str, value: int) -> None:
-        """Write a property of a node, which takes some time for it."""
+    def put(self, node: int, name: str, value: int) -> None:
+        """Write a property of a node."""
         self.send(frames.put(node, self.number(node, name), value))
+
+    def write(self, node: int, name: str, value: int) -> None:
+        """The same, and wait: it takes some time for the node."""
+        self.put(node, name, value)
         self.line.sleep(BUS.between_writes)
