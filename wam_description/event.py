@@ -8,7 +8,7 @@ Value = float | str
 HOLDS = "holds"  # value that is 1 where the force loop holds the arm instead of obeying
 RAISED = "raised"  # cause of a fault: a callback raised an exception
 CAUSE = "cause"  # value that names the sentence of a code, where that has several
-SUBJECTS = (CAUSE, "axis", "cover", "joint", "node", "topic", "reason")  # values that distinguish two events of a code
+SUBJECTS = (CAUSE, "axis", "commanded_on", "joint", "node", "topic", "reason")  # which events of a code are two
 
 
 class Level(IntEnum):

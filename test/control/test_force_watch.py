@@ -25,7 +25,6 @@ UNPINNED = AXIS._replace(place=AXIS.place._replace(is_pinned=False))
 SETTLING = OWN.limits.settling_time
 
 
-# --------------------------------------------------------------------------------------------- a force
 class Pressed:
     """A watched force, measured as it is said."""
 
@@ -89,6 +88,15 @@ def test_at_a_place_that_is_not_pinned_it_is_refused_until_the_force_is_there() 
     assert pressed.last(DT, 2.0, 0.7) == REFUSED
     assert pressed.last(DT, FORCE, 0.45) == []
     assert pressed.last(DT, 2.0, 0.7) == [], "once it was there"
+
+
+def test_a_refusal_stays_the_same_report_while_the_estimated_link_wavers() -> None:
+    assert UNPINNED.place is not None
+    pressed, subjects = Pressed(UNPINNED), set()
+    for cover in ("outer_link", "inner_link"):
+        pressed.axis = UNPINNED._replace(place=UNPINNED.place._replace(cover=cover))
+        subjects |= {event.subject for event in pressed.go(DT, 2.0, 0.7)[-1]}
+    assert len(subjects) == 1
 
 
 def test_what_is_not_known_well_enough_while_it_presses_is_reported_with_what_is_off_already() -> None:
@@ -239,7 +247,6 @@ def test_a_new_command_settles_anew() -> None:
     assert pressed.last(0.2) == [(Code.NOT_REACHED, "force_off", False)]
 
 
-# --------------------------------------------------------------------------------------------- a motion
 GAIN, FASTEST, LATE = 8.0, 1.5, 0.5
 
 

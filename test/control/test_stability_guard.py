@@ -109,7 +109,6 @@ def test_nothing_accepted_diverges_and_without_the_guard_much_would() -> None:
     assert sum(one.is_accepted for one in found) >= 5, "a guard that refuses everything is none"
 
 
-# --------------------------------------------------------------------------------------- the arm
 @pytest.mark.slow
 def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_stays() -> None:
     loop = Loop(OWN)
@@ -223,7 +222,6 @@ def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_o
     assert silent.supervision.assessment is None
 
 
-# ----------------------------------------------------------------------------------- the testbed
 def test_mode_limit_lowers_the_gains_to_what_a_refusal_allows() -> None:
     high = bench(force_gain=(0.2,), force_error_limit=(5.0,), force_proportional_gain=(0.0,))
     with pytest.raises(ParameterError, match="domain II or III; allowed: force_gain up to") as refusal:
@@ -247,7 +245,6 @@ def test_mode_limit_lowers_the_posture_gain_where_the_velocity_loop_is_too_slow_
     assert "lowered to be stable: posture_gain [" in loop.supervision.report.message
 
 
-# ------------------------------------------------------------------------------- while it moves
 def follow(
     loop: ForceLoop,
     q: Sequence[float],

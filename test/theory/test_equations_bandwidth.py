@@ -33,7 +33,6 @@ def test_soft_contact_keeps_its_digits() -> None:
     assert abs(printed / lower - 1) > 1e-3
 
 
-# ------------------------------------------------------------------------------------- transfers
 JM, JL, KTR, KC, N = 0.002, 0.7, 9.0, 400.0, 6.0
 
 
@@ -74,7 +73,6 @@ def test_reducer_at_the_joint_gives_root_n_at_constant_stress_and_n_for_equal_li
     assert equal == pytest.approx(ratio)
 
 
-# ---------------------------------------------------------------------------------------- limits
 def test_limits_are_those_of_the_eigenvalues() -> None:
     rigid, lower = math.sqrt(1e-7 / (JL + N * N * JM)), eigenvalues(JM, JL, KTR, 1e-3, N)[0]
     assert resonance.soft_contact_bandwidth(JM, JL, 1e-7, N) == pytest.approx(rigid, rel=1e-12)
@@ -89,7 +87,6 @@ def test_limits_are_those_of_the_eigenvalues() -> None:
         assert min(curves) == pytest.approx(eigenvalues(JM, JL, KTR, kc, 1e-4)[0], rel=1e-5)
 
 
-# -------------------------------------------------------------------------------- best stiffness
 INCHES = {"motor_inertia": 0.0057 / 16.0, "link_inertia": 4.0, "transmission_stiffness": 2.0 * 262.0 * 0.375**2}
 
 

@@ -28,7 +28,6 @@ def peaks(trajectory: Trajectory, force: float) -> list[float]:
     return [abs(force - event.contact_force) for event in trajectory.events if event.kind in kinds]
 
 
-# ------------------------------------------------------------------------------ a second integrator
 State = tuple[float, float, float]
 
 
@@ -158,7 +157,6 @@ def test_cases_reach_every_kind_of_event() -> None:
     assert seen == set(Kind)
 
 
-# ---------------------------------------------------------------------------------------- properties
 def random_cases(count: int) -> list[tuple[FrictionNode, IntegralLoop, float]]:
     rng = np.random.default_rng(3)
     cases = []
@@ -230,7 +228,6 @@ def stored(node: FrictionNode, motion: Motion) -> float:
     )
 
 
-# --------------------------------------------------------------------------- the errata's numbers
 def test_first_peaks_shrink_and_the_response_still_diverges() -> None:
     trajectory = simulate(unit_node(), IntegralLoop(1.5), 4.0, 400.0)
     assert peaks(trajectory, 4.0)[:5] == pytest.approx([4.00, 2.70, 2.94, 3.06, 3.24], abs=0.006)
@@ -276,7 +273,6 @@ def test_early_verdicts_are_those_of_long_runs() -> None:
     assert seen == {Verdict.DIVERGED, Verdict.SETTLED, Verdict.LIMIT_CYCLE}
 
 
-# ---------------------------------------------------------------------------- stiction limit cycle
 def test_a_force_that_still_rises_in_even_steps_is_not_in_a_cycle_yet() -> None:
     node, loop = FrictionNode(1.0, 0.06, 1.2, 0.08, 1.0, 1.07), IntegralLoop(0.14, 0.5, sample_period=0.5)
     assert assess(node, loop, 30.0, max_events=3000).verdict is Verdict.UNDECIDED
@@ -291,7 +287,6 @@ def test_saturation_lets_a_destabilising_step_survive() -> None:
         assert assess(unit_node(), IntegralLoop(1.5, error_limit=1.0), step).verdict is Verdict.SETTLED
 
 
-# ------------------------------------------------------------------------------ the testbed of 5.6
 def testbed(friction: float) -> FrictionNode:
     return FrictionNode(*TESTBED, friction, friction)
 

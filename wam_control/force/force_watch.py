@@ -263,8 +263,7 @@ class ForceWatch:
             source = "pinned" if place.is_pinned else "estimated"
         return {
             "error": error, "part": part, "source": source, "desired": axis.desired,
-            "allowed": known.tolerance, "unit": _unit(axis), "cover": place.cover if place else axis.of.name,
-            "position": place.position if place else math.nan,
+            "allowed": known.tolerance, "unit": _unit(axis), **_where(axis),
         }  # fmt: skip
 
     def _contradicted(self, axis: CommandedAxis, seen: Seen, dt: float) -> Event | None:
@@ -274,7 +273,7 @@ class ForceWatch:
         is_other = bool(seen.touched) and (is_strange or place is None or not place.is_pinned)
         if not self._other.step(is_other, FORCE.impact_time, FORCE.impact_time, dt) or place is None:
             return None
-        return holding(Code.UNEXPLAINED, "other_link", cover=place.cover, touched=seen.touched)
+        return holding(Code.UNEXPLAINED, "other_link", touched=seen.touched, **_where(axis))
 
     def _travelled(self, seen: Seen, is_reached: bool, own: ForceLoopParameters) -> Event | None:
         """The arm has moved too far along or against a force that is not reached."""
@@ -292,8 +291,7 @@ class ForceWatch:
         """The torques are not those of the force, or no longer those with which it has settled."""
         if axis.sensed is None or axis.place is None or known.sd == math.inf:
             return []
-        where: dict[str, Value] = {"cover": axis.place.cover, "position": axis.place.position}
-        event, lasting = None, own.limits.settling_time
+        event, lasting, where = None, own.limits.settling_time, _where(axis)
         if known.chi2 > FORCE.unexplained and self.touch.is_there:
             source, allowed = _source(own, self._is_dithered), FORCE.unexplained
             event = warning(
@@ -366,6 +364,14 @@ class MotionWatch:
 def _source(own: ForceLoopParameters, is_dithered: bool) -> str:
     """What measures the force."""
     return ("dithered motors" if is_dithered else "motors") if own.is_estimated else "sensors"
+
+
+def _where(axis: CommandedAxis) -> dict[str, Value]:
+    """On which link or joint it is commanded, '' for any link, and where it is now taken to act."""
+    name, place = axis.of.name, axis.place
+    if place is None:
+        return {"commanded_on": name, "cover": name, "position": math.nan}
+    return {"commanded_on": axis.of.cover, "cover": place.cover, "position": place.position}
 
 
 def _unit(axis: CommandedAxis) -> str:
