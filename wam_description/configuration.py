@@ -15,7 +15,7 @@ import yaml
 from wam_description import yaml_text
 from wam_description.arm import Shared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build, fields, given_once, listed, nested
+from wam_description.parameters import ParameterError, build, fields, given_once, listed, nested, require_fit
 from wam_description.thresholds import FILES
 
 GIVEN = "a value that you set"  # what is at fault where the file is right
@@ -112,19 +112,19 @@ class Configuration(NamedTuple):
             is_open = has_own and node not in NODES if colon else parameter in _NOT_REQUIRED
             if parameter not in flat and not is_open:
                 where = f"node '{node}'" if colon else "section '/**'"
-                meant, groups = self._meant(key), sorted({re.sub(r"\..*", ".*", name) for name in flat})
+                likely, groups = self._likely_keys(key), sorted({re.sub(r"\..*", ".*", name) for name in flat})
                 raise ParameterError(
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
                     + (
-                        f"did you mean {meant}?"
-                        if meant
+                        f"did you mean {likely}?"
+                        if likely
                         else f"it has: {', '.join(groups) or 'none'} (write node:parameter for one of a node)"
                     )
                 )
             flat[parameter] = shaped_like(flat.get(parameter), value)
         return _made(self.path, sections)
 
-    def _meant(self, key: str) -> str:
+    def _likely_keys(self, key: str) -> str:
         """Parameters that `key` may mean: of this name in another section, or the one that is most like it."""
         keys = {
             name if section == SHARED else f"{section.rpartition('/')[2]}:{name}": name
@@ -182,11 +182,11 @@ class Configuration(NamedTuple):
         return node
 
     def _build(self, section: str, cls: type[T]) -> T:
-        """Parameters of a section, which their class and its method `require_fit`, if it has one, do not refuse."""
+        """Parameters of a section that their class takes, and that fit the arm."""
         try:
             own = build(cls, self.sections[section])
-            if fit := getattr(own, "require_fit", None):
-                fit(self.shared.arm)
+            if section != SHARED:
+                require_fit(own, self.shared.arm)
             return own
         except ParameterError as error:
             where = f"section '{SHARED if section == SHARED else f'/**/{section}'}'"

@@ -10,7 +10,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.defects import Check, UnusableOutput, defect_finder, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE, installation
-from wam_description.parameters import ParameterError, meant
+from wam_description.parameters import ParameterError, meant, require
 from wam_description.synchroniser import InputSpec, Synchroniser
 from wam_description.thresholds import FILES, INPUTS
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
@@ -24,11 +24,6 @@ from wam_description.wiring import (
     declaration,
     needed_arrays,
     raised,
-)
-
-BETWEEN = (
-    "it is sent at the outer rate, but this step, one for each {}, is between two outer periods: no node would use it; "
-    "write thinned=True in @reaction, or return it only where shared.timing.is_outer(inputs.stamp)"
 )
 
 
@@ -95,20 +90,21 @@ def require_parameters(configuration: Configuration) -> None:
     Raises
     ------
     ParameterError
-        names the section, the value and what is allowed.
+        names each section, the values and what is allowed.
     """
     shared = configuration.shared
     require_sections(configuration.sections, shared.nodes)
+    refusals = []
     for entry in shared.nodes:
         one = declared(entry)
         if one.name in configuration.sections:
             try:
                 configuration.node(one.name, one.parameter_class)
             except ParameterError as error:
-                if one.name not in NODES or one.node.__module__.startswith("wam_"):
-                    raise
                 shares = f"node '{entry}' has the name and so the parameters of the packaged node '{one.name}'"
-                raise ParameterError(f"{shares}: give it another name; {error}") from error
+                is_own = one.name in NODES and not one.node.__module__.startswith("wam_")
+                refusals.append(f"{shares}: give it another name; {error}" if is_own else str(error))
+    require(not refusals, "; also: ".join(refusals))
 
 
 def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:
@@ -265,7 +261,13 @@ class Interface:
                 raise UnusableOutput(declaration.name, f"output of {reaction.method}", reason)
             if not is_outer and not timing.is_outer(inputs.stamp):
                 for name in outer & outputs.keys():
-                    raise UnusableOutput(declaration.name, name, BETWEEN.format(reaction.trigger.topic))
+                    raise UnusableOutput(
+                        declaration.name,
+                        name,
+                        f"it is sent at the outer rate, but this step, one for each {reaction.trigger.topic}, is "
+                        "between two outer periods: no node would use it; write thinned=True in @reaction, or return "
+                        "it only where shared.timing.is_outer(inputs.stamp)",
+                    )
             return outputs
 
         return checked

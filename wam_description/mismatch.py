@@ -25,6 +25,10 @@ class ModelMismatch:
     payload: float = parameter("unmodelled payload at the tool, in addition to arm.payload", "kg", high=100.0)
     torque_constant: tuple[float, ...] = parameter("factor on the torque of each motor per current", low=0.1, high=10.0)
 
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse lists without one value for each motor."""
+        aligned("mismatch", arm.motors.names, self)
+
 
 def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
     """The arm of the true plant.
@@ -34,7 +38,7 @@ def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
     ParameterError
         if a list has not one value each, or a payload would tilt the principal axes of the last link.
     """
-    aligned("mismatch", arm.motors.names, mismatch)
+    mismatch.require_fit(arm)
     by_motor = dict(zip(arm.motors.names, mismatch.stiffness, strict=True))
     stages = [by_motor[motor] for motor in arm.cables.stage_motors]
     motors = _scaled(arm.motors, mismatch.torque_constant, "torque_constant")

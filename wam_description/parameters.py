@@ -321,10 +321,31 @@ def require(condition: bool, message: str) -> None:
         raise ParameterError(message)
 
 
-def lengths(
-    group: str, names: Sequence[Any], arrays: Mapping[str, Sequence[Any]], width: int = 1, is_common: bool = False
-) -> None:
-    """Refuse arrays that do not have `width` values for each of the names, or one for all where that `is_common`.
+def require_fit(own: Any, arm: Any) -> None:
+    """Refuse parameters that do not fit an arm, by the method `require_fit` of their class and of classes nested in it.
+
+    Raises
+    ------
+    ParameterError
+        names all that is wrong.
+    """
+    refusals = list(_misfits(own, arm))
+    require(not refusals, "; ".join(refusals))
+
+
+def _misfits(own: Any, arm: Any) -> Iterator[str]:
+    for item in dataclasses.fields(own):
+        value = getattr(own, item.name)
+        if dataclasses.is_dataclass(value):
+            yield from _misfits(value, arm)
+    try:
+        getattr(own, "require_fit", lambda arm: None)(arm)
+    except ParameterError as error:
+        yield str(error)
+
+
+def lengths(group: str, names: Sequence[Any], arrays: Mapping[str, Sequence[Any]], width: int = 1) -> None:
+    """Refuse arrays that do not have `width` values for each of the names.
 
     Parameters
     ----------
@@ -332,15 +353,11 @@ def lengths(
     names : what the arrays run over.
     arrays : arrays by the name of their field.
     """
-    for name, array in arrays.items():
-        require(
-            len(array) == width * len(names) or (is_common and len(array) == 1),
-            f"parameter '{group}.{name}' has {len(array)} values; it needs {'1 or ' * is_common}{width * len(names)}",
-        )
+    _require_lengths(_wrong_length(group, name, array, width * len(names)) for name, array in arrays.items())
 
 
 def aligned(group: str, names: Sequence[Any], given: Any) -> None:
-    """Refuse lists of a parameter object that do not have as many values for each of the names as they declare.
+    """Refuse the lists of a parameter object that do not have as many values for each of the names as they declare.
 
     Parameters
     ----------
@@ -348,8 +365,22 @@ def aligned(group: str, names: Sequence[Any], given: Any) -> None:
     names : what all of its lists run over.
     given : the object.
     """
-    for name, array, declared in _lists(given):
-        lengths(group, names, {name: array}, declared["width"], declared["is_common"])
+    _require_lengths(
+        _wrong_length(group, name, array, declared["width"] * len(names), declared["is_common"])
+        for name, array, declared in _lists(given)
+    )
+
+
+def _wrong_length(group: str, name: str, array: Sequence[Any], needed: int, is_common: bool = False) -> str:
+    """What is wrong with the length of a list, '' where nothing; one value is enough where that `is_common`."""
+    if len(array) == needed or (is_common and len(array) == 1):
+        return ""
+    return f"parameter '{group}.{name}' has {len(array)} values; it needs {'1 or ' * is_common}{needed}"
+
+
+def _require_lengths(wrong: Iterable[str]) -> None:
+    found = list(filter(None, wrong))
+    require(not found, "; ".join(found))
 
 
 def each(array: tuple[T, ...], count: int) -> tuple[T, ...]:

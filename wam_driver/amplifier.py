@@ -7,7 +7,6 @@ from operator import add, mul
 
 import numpy as np
 
-from wam_description.parameters import aligned
 from wam_description.parts import Motors
 from wam_driver.imperfections import AmplifierParameters
 
@@ -38,7 +37,6 @@ class Amplifier:
         random: np.random.Generator,
         true_constant: Sequence[float] | None = None,
     ) -> None:
-        aligned("amplifier", motors.names, parameters)
         self.torque_constant = list(motors.torque_constant)
         self._true_constant = list(true_constant or motors.torque_constant)
         self.peak = list(motors.peak_current)

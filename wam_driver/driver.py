@@ -12,7 +12,7 @@ from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.event import Value, fault
 from wam_description.mismatch import ModelMismatch, true_arm
-from wam_description.parameters import parameter, require
+from wam_description.parameters import parameter, require, require_fit
 from wam_description.signals import BASE, NO_LOAD, ZERO, Answer, Load, Point, State, Table, Wrench
 from wam_description.small_matrices import rotation_xyz
 from wam_description.world import World
@@ -59,10 +59,6 @@ class DriverParameters:
     tip_speed_limit: float = parameter("speed of the tool above which the driver faults", "m/s", high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
-
-    def require_fit(self, arm: Arm) -> None:
-        """Refuse live parameters that do not fit the arm."""
-        self.effects.require_fit(arm)
 
 
 class DriverSample(NamedTuple):
@@ -112,6 +108,7 @@ class Driver:
 
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
         arm, timing = shared.arm, shared.timing
+        require_fit(parameters, arm)
         self.safety = Safety(self._begin, self._discard)
         random = np.random.Generator(np.random.PCG64(parameters.seed))
         true = true_arm(arm, parameters.mismatch)
@@ -203,7 +200,7 @@ class Driver:
         self._begin_period(self._tick + 1)
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
-            theta, thetad = self._turned
+            theta, thetad = self._true_motion
             self._recent.append(self._packed(self.stamp, *theta, *thetad, *self._command, *self.currents))
         self._pulls.append(self.plant.cable_pull)
         if self.is_outer:
@@ -219,7 +216,7 @@ class Driver:
             return
         if pushed := self.plant.pushes_in_words():
             self._last_push = pushed, self._tick
-        watched = self._watch.watched(*self._turned, self.currents, tensions)
+        watched = self._watch.watched(*self._true_motion, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
@@ -236,7 +233,7 @@ class Driver:
         """The push that acts, or acted a short time before, s; '' for none."""
         pushed, tick = self._last_push
         ago = (self._tick - tick) * self.timing.period
-        return {"push": pushed * (ago <= DRIVER.recent), "ago": ago}
+        return {"push": pushed * (ago <= DRIVER.push_memory), "ago": ago}
 
     def disturb(self, wrench: Wrench) -> None:
         """Take a message of `sim/disturbance`: the one push of messages, in the base frame none; see `Plant.push`.
@@ -255,8 +252,8 @@ class Driver:
                 raise ValueError(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
             self._end_disturbance()
             return
-        if excess := self._push_excess(*push):
-            raise ValueError(f"{excess}; the last push remains")
+        if too_much := self._push_excess(*push):
+            raise ValueError(f"{too_much}; the last push remains")
         self.plant.push(cover, *push)
         if self._disturbed != cover:
             self._end_disturbance()
@@ -294,7 +291,7 @@ class Driver:
     def _measure(self) -> None:
         plant, period = self.plant, self.timing.period
         torque = self.amplifier.nominal_torque(self.currents)
-        self._turned = theta, thetad = plant.theta, plant.thetad
+        self._true_motion = theta, thetad = plant.theta, plant.thetad
         self.motor_state = self._sensors.motors.read(State(theta, thetad, torque), period)
         if self._arm.joint_sensors:
             self.joint_sensors = self._sensors.joints.read(State(plant.q, plant.qd, plant.strain_torque), period)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from itertools import repeat
 from typing import Protocol
 
-from wam_description.parameters import each, parameter
+from wam_description.arm import Arm
+from wam_description.parameters import aligned, each, parameter
 
 
 class FrictionLaw(Protocol):
@@ -143,6 +144,10 @@ class FrictionParameters:
         high=0.9,
         default=0.0,
     )
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse lists that have neither one value nor one for each motor or joint."""
+        aligned("friction", arm.motors.names, self)
 
 
 COULOMB_STICTION = FrictionParameters(

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import parameter
+from wam_description.arm import Arm
+from wam_description.parameters import aligned, parameter
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,10 @@ class AmplifierParameters:
         "bandwidth of the current loop, of first order; 0: unlimited", "Hz", high=1e5, default=0.0
     )
     delay: int = parameter("delay of the current loop, in periods", high=100, default=0)
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse lists without one value for each motor."""
+        aligned("amplifier", arm.motors.names, self)
 
 
 @dataclass(frozen=True)
@@ -52,3 +57,7 @@ class SensorParameters:
     strain_noise: tuple[float, ...] = parameter(
         "standard deviation of the noise of the strain torque", "N m", high=100.0
     )
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse lists without one value for each motor or joint."""
+        aligned("sensors", arm.motors.names, self)

@@ -36,7 +36,7 @@ class CircuitThresholds:
 class DriverThresholds:
     """When the driver warns, waits and reports."""
 
-    recent: float = 0.2  # s, for which a push that has ended may be the cause of what the arm does
+    push_memory: float = 0.2  # s, for which a push that has ended may be the cause of what the arm does
     status_period: float = 0.05  # s, between repetitions of the status in realtime, so that every node knows the brakes
     rounding: float = 1e-9  # m, of a contact position
     warning: float = 0.9  # of a limit

@@ -43,7 +43,7 @@ REFUSED = [
     ("demo --set arm.payload=.nan", "parameter 'arm.payload' is nan kg; allowed: 0 to 50"),
     ("demo --set force_loop:force_gain=[-1.0]", "parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
     ("guard --set force_loop:force_gain=[1,2]", "that you set, section '/**/force_loop': parameter 'force_gain' has 2"),
-    ("demo --set driver:effects.added_coulomb_friction=[0.5]", "friction' has 1 values; it needs 4"),
+    ("up --set driver:effects.tension_friction=[1] --set velocity_loop:dither.phase=[]", "it needs 4; also: "),
     *(
         (f"{words} --set arm.payload=0.5 --set arm.payload=1", "--set has arm.payload twice, with two values")
         for words in ("model urdf", "demo --no-live", "up", "sweep t.csv --vary seed=1")

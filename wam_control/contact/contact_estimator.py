@@ -197,7 +197,7 @@ class ContactEstimator:
                 self._inference.fusion.reset()
             return ContactEstimate(external, sd, statistic, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
-        now, late = observer.moment(torques), self._late(torques, precision, size)
+        now, late = observer.instant(torques), self._late(torques, precision, size)
         hypotheses = self._inference.infer(observer.seen.pose, torques, precision, load, now, late)
         return ContactEstimate(external, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
 

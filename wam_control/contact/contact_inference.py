@@ -16,7 +16,7 @@ from wam_control.contact.contact_fusion import ContactFusion, Torques
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
-from wam_description.parameters import aligned, require, rows
+from wam_description.parameters import require, rows
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ZERO
@@ -45,7 +45,7 @@ class Hypothesis(NamedTuple):
     direction : rad, angle of the force about the link, from the cover's y to its z axis.
     direction_sd : rad.
     moment : (3,), N m, of the force about the origin of the cover's frame, in that frame.
-    residual : chi^2 that the contact does not explain, per moment that counts.
+    residual : chi^2 that the contact does not explain, per instant that counts.
     reasons : why the position is unknown or the estimate not reliable.
     """
 
@@ -91,13 +91,13 @@ class ContactInference:
 
     Attributes
     ----------
-    fusion : earlier moments of the present contact.
+    fusion : earlier instants of the present contact.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
         self._body, self._parameters = body, parameters
         self._covers = covers = [_cover(arm, body, cover) for cover in rows(arm.covers)]
-        aligned("inference", arm.covers.names, parameters)
+        parameters.require_fit(arm)
         start, end = ([at[0] for at in ends] for ends in zip(*((c.start, c.end) for c in covers), strict=True))
         self._fit = ContactFit(start, end, arm.covers.radius, parameters)
         self._wrenches = np.array([cover.wrenches for cover in covers])
@@ -147,9 +147,9 @@ class ContactInference:
             payload += log_evidence_of_weight(rr, ra, aa, given.force_scale / STANDARD_GRAVITY)
         fits = self._fit(gram[:links], payload)
         order = sorted(range(links), key=lambda i: -fits[i].probability)
-        best, moments = fits[order[0]], 1
+        best, instants = fits[order[0]], 1
         if now is not None:
-            moments = self.fusion.count
+            instants = self.fusion.count
             self.fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
         reasons, doubtful = NO_REASON, 0.5
         if best.probability < given.identification_threshold:
@@ -159,14 +159,14 @@ class ContactInference:
         found = []
         for i in order:
             own = reasons | Reason.ALONG if fits[i].along > doubtful else reasons
-            found.append(self._hypothesis(i, fits[i], own, moments, late))
+            found.append(self._hypothesis(i, fits[i], own, instants, late))
         return tuple(found)
 
-    def _hypothesis(self, i: int, fit: Fit, reasons: Reason, moments: int, late: float) -> Hypothesis:
+    def _hypothesis(self, i: int, fit: Fit, reasons: Reason, instants: int, late: float) -> Hypothesis:
         cover = self._covers[i]
         start, end = cover.start[0], cover.end[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > end - start
-        residual = fit.residual / moments
+        residual = fit.residual / instants
         if cover.is_moment_only:
             reasons |= Reason.MOMENT_ONLY
         elif is_unknown:

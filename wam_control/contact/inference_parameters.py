@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import parameter
+from wam_description.arm import Arm
+from wam_description.parameters import aligned, parameter
 
 
 @dataclass(frozen=True)
@@ -36,3 +37,7 @@ class InferenceParameters:
         "probability from which the link in contact is identified", low=0.5, high=1.0
     )
     largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", high=1e6)
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse lists that are not one value for each cover."""
+        aligned("inference", arm.covers.names, self)

@@ -22,7 +22,6 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.event import Code, Event, warning
 from wam_description.model import ArmModel
-from wam_description.parameters import require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 
@@ -63,7 +62,7 @@ class MomentumObserver:
     ----------
     body : links of the nominal model.
     age : s, since the first sample.
-    seen : the moment of which torques were last given.
+    seen : the instant of which torques were last given.
     """
 
     def __init__(
@@ -74,12 +73,9 @@ class MomentumObserver:
         cycle: int = 0,
         model: ArmModel | None = None,
     ) -> None:
-        n = len(arm.joints.names)
-        require(
-            len(parameters.mass_scale) == n,
-            f"parameter 'observer.mass_scale' has {len(parameters.mass_scale)} values; {n} links need {n}",
-        )
-        self._n, self._parameters = n, parameters
+        parameters.require_fit(arm)
+        n = self._n = len(arm.joints.names)
+        self._parameters = parameters
         self.body = RigidBody(arm, parameters.mass_scale)
         self._side = side = MotorSide(arm, parameters, cycle > 0, model)
         self._is_link_side = use_joint_sensors
@@ -201,7 +197,7 @@ class MomentumObserver:
         self.seen = self._observation()
         return self._errors.external(self.seen)
 
-    def moment(self, torques: Array) -> Torques:
+    def instant(self, torques: Array) -> Torques:
         """The external torques last given, (n,), N m, with what is known of their errors."""
         return Torques(self.age, torques, *self._errors.parts(self.seen), self.seen.pose)
 

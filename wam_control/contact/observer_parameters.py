@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from wam_description.arm import Arm
 from wam_description.parameters import parameter, require
 
 
@@ -76,4 +77,12 @@ class ObserverParameters:
         require(
             low <= high,
             f"parameter 'observer.payload' is {list(self.payload)}; it needs the smallest and the largest mass",
+        )
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse factors that are not one for each link."""
+        n = len(arm.links.names)
+        require(
+            len(self.mass_scale) == n,
+            f"parameter 'observer.mass_scale' has {len(self.mass_scale)} values; {n} links need {n}",
         )

@@ -8,7 +8,7 @@ from wam_control.task.scenario_values import known, require_list
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface
-from wam_description.parameters import ParameterError, build, checked, fields, given_once, meant, require
+from wam_description.parameters import ParameterError, build, checked, fields, given_once, meant, require, require_fit
 
 NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
@@ -76,7 +76,7 @@ def require_settings(
 ) -> None:
     """Refuse settings, those of each step, that do not fit the other values that their node has by then.
 
-    What a class of parameters refuses itself is refused; where it has a method `require_fit`, with the arm.
+    What a class of parameters refuses itself is refused, and what does not fit the arm.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def require_settings(
         for node in dict.fromkeys(setting.node for setting in of_step):
             try:
                 own = build(_parameter_class(where, node, shared, controllers), sections[node])
-                getattr(own, "require_fit", lambda arm: None)(shared.arm)
+                require_fit(own, shared.arm)
             except ParameterError as error:
                 raise ParameterError(f"{where}, step {i + 1}: set, {node}: {error}") from None
 

@@ -29,6 +29,11 @@ class DitherParameters:
     )
     phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
 
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse phases that are not one for each motor."""
+        n = len(arm.motors.names)
+        require(len(self.phase) == n, f"parameter 'dither.phase' has {len(self.phase)} values; {n} motors need {n}")
+
 
 class DitherCost(NamedTuple):
     """Side effects of the dither.
@@ -54,11 +59,7 @@ class Dither:
     """
 
     def __init__(self, arm: Arm, timing: Timing, parameters: DitherParameters) -> None:
-        n = len(arm.motors.names)
-        require(
-            len(parameters.phase) == n,
-            f"parameter 'dither.phase' has {len(parameters.phase)} values; {n} motors need {n}",
-        )
+        parameters.require_fit(arm)
         require(
             timing.dither_cycle == 0 or timing.dither_cycle >= VELOCITY.shortest_cycle,
             f"parameter 'timing.dither_cycle' is {timing.dither_cycle}; it must be 0 or at "
