@@ -119,20 +119,20 @@ class Arm:
             beyond = end - following[link]
             along = float(beyond @ x)
             across = math.dist(beyond, along * x)
-            here = what = "arm.tool"
+            also = what = "arm.tool"  # what has to change with the length
             if link + 1 < len(links):
                 what = joints[link + 1].name
-                here = f"arm.joints.offset and length of {what}, arm.covers.origin"
+                also = f"arm.joints.offset and length of {what}, arm.covers.origin"
                 across = max(0.0, across - cover.radius)  # the axis of a joint may cross the tube anywhere
                 apart = math.hypot(along, across)
             else:
                 apart = max(0.0, along) if across <= MODEL.same_point else 0.0  # a tool may be beyond or next to it
-            coupled = f"; to change the length of {cover.name}, change arm.covers.length and end, {{}}, "
-            coupled += "and arm.links.mass, centre, inertia"
+            cure = f"; to change the length of {cover.name}, change arm.covers.length and end, "
+            masses = ", and arm.links.mass, centre, inertia"
             require(
                 apart <= MODEL.same_point,
                 f"{cover.name} ends at {_point(end)} m in the frame of {cover.link}, by arm.covers.length, but "
-                f"{what} is at {_point(following[link])} m" + coupled.format(here),
+                f"{what} is at {_point(following[link])} m{cure}{also}{masses}",
             )
             own = joints[link]
             before = (-own.length, 0.0, -own.offset)  # the joint before, in this link's frame
@@ -140,13 +140,13 @@ class Arm:
                 min(math.hypot(*cover.origin), math.dist(cover.origin, before)) <= MODEL.same_point,
                 f"{cover.name}: arm.covers.origin is {_point(cover.origin)} m; allowed: (0, 0, 0), or "
                 f"{_point(before)}, where {own.name} begins by arm.joints.length and offset"
-                + coupled.format("arm.covers.origin, arm.joints.offset"),
+                f"{cure}arm.covers.origin, arm.joints.offset{masses}",
             )
             far = max(cover.start[0], cover.end[0])
             require(
                 far <= cover.length + MODEL.same_point,
                 f"{cover.name}: arm.covers.start and end reach up to {far:g} m, but arm.covers.length is "
-                f"{cover.length:g} m" + coupled.format(here),
+                f"{cover.length:g} m{cure}{also}{masses}",
             )
 
     def _require_plausible(self) -> None:

@@ -110,7 +110,7 @@ LARGEST: Final = {
 }
 LARGEST_ESTIMATE: Final = 1e12  # in a column of the contact hypotheses, whatever its unit
 LARGEST_ELSEWHERE: Final = 1e100  # in other tables
-_KNOWN: Final = (LINK, "probability", "force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+_NEVER_UNKNOWN: Final = (LINK, "probability", "force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 
 
 class Column(NamedTuple):
@@ -128,7 +128,8 @@ def columns_of(names: tuple[str, ...]) -> tuple[Column, ...]:
         return tuple(Column(name, LARGEST_ESTIMATE, name in ("value", "position")) for name in names)
     known = HYPOTHESIS_COLUMNS
     return tuple(
-        Column(name, LARGEST_ESTIMATE if name in known else LARGEST_ELSEWHERE, name not in _KNOWN) for name in names
+        Column(name, LARGEST_ESTIMATE if name in known else LARGEST_ELSEWHERE, name not in _NEVER_UNKNOWN)
+        for name in names
     )
 
 

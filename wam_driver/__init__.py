@@ -5,7 +5,7 @@
 - arm_driver_node: what every node `driver` has, simulated or real; driver_node: the simulated one
 - lockstep, realtime: the two ways in which its time passes
 - pacer: simulated time no faster than the wall clock
-- session: which life of the driver the nodes follow
+- session: which start of the driver the nodes follow
 - safety: braked, enabled, fault
 - limit_watch: speeds, travel, currents and tensions against their limits
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents

@@ -24,11 +24,10 @@ def unpublished(found: Mapping[str, Sequence[str]]) -> str:
 class Lockstep:
     """Advances the driver with the command that answers its present state, and reports when none comes.
 
-    Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node: shortly before,
-    the roll is called with a new session.  A node that does not report that it follows has stopped; of those that do,
-    the one that lacks nothing for its step has not answered.  From then on
-    time creeps, a period every `watch`, braked: states go out, so that a node that was restarted finds its way in;
-    with the next answer lockstep goes on.
+    Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node.  Shortly before,
+    a new session is announced.  A node that does not report that it follows has stopped; of those that do, the one
+    that lacks nothing for its step has not answered.  After the fault the arm is braked and advances by one period
+    every `watch`, so that a node that was restarted gets states; with the next answer lockstep goes on.
 
     Parameters
     ----------

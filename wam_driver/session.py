@@ -1,4 +1,4 @@
-"""The session of a driver: which of its lives the nodes follow, and since when commands count."""
+"""The session of a driver, a number for each start: which one the nodes follow, and since when commands count."""
 
 from collections.abc import Collection
 

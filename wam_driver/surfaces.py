@@ -1,7 +1,7 @@
 """Contact forces of the plant: each surface gives the force of its own law, and contacts stick truly."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,19 @@ from wam_driver.thresholds import PLANT
 
 Array = NDArray[np.float64]
 
-SurfaceLaw = tuple[int, int, float, float, float, int, bool]  # see `Surfaces.laws`
 WHOLE = [1.0]
+
+
+class SurfaceLaw(NamedTuple):
+    """The law of the contact force of a pair of geoms; the steps in C read it by index."""
+
+    first: int  # geoms
+    second: int
+    stiffness: float  # N/m
+    damping: float  # N s/m
+    hardening: float  # 1/m
+    rows: int  # of a contact in MuJoCo's constraints: along the normal, then along the surface
+    is_shared: bool  # whether several contacts share the stiffness
 
 
 class Mover(Protocol):
@@ -40,8 +51,7 @@ class Surfaces:
 
     Attributes
     ----------
-    laws : of each pair its geoms, the stiffness, N/m, damping, N s/m, and hardening, 1/m, of the contact, the number of
-        its rows, and whether several contacts share the stiffness.
+    laws : of each pair.
     """
 
     def __init__(self, model: Any, data: Any, arm: Arm, world: World, movers: Sequence[Mover], step: float) -> None:
@@ -54,7 +64,7 @@ class Surfaces:
         given = {one.name: one for one in contact_pairs(arm, world)}
         self._given = [given[model.pair(i).name] for i in range(model.npair)]
         self.laws: list[SurfaceLaw] = [
-            (*pair, float(law.stiffness), float(law.damping), float(law.hardening), size, law.is_shared)
+            SurfaceLaw(*pair, float(law.stiffness), float(law.damping), float(law.hardening), size, law.is_shared)
             for pair, law, size in zip(pairs, self._given, model.pair_dim.tolist(), strict=True)
         ]
 
@@ -124,7 +134,7 @@ class Surfaces:
             if row >= 0 and mover is not None:
                 sign = 1.0 if second in self._mover else -1.0
                 along = (contact.frame[i].reshape(3, 3) @ mover.velocity).tolist()
-                for k in range(self.laws[pair][5]):
+                for k in range(self.laws[pair].rows):
                     velocity[row + k] += sign * along[k]
 
 

@@ -29,7 +29,7 @@ def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> N
     rows[:, [0, 6]] = same = 1e4 * random.standard_normal(4)
     moments = []
     for k in range(4):
-        time, own, effects = k * 1.1 * CONTACT.moment_interval, random.uniform(0.1, 0.4, 4), random.normal(size=(4, 5))
+        time, own, effects = k * 1.1 * CONTACT.instant_interval, random.uniform(0.1, 0.4, 4), random.normal(size=(4, 5))
         moments.append(Torques(time, same, effects, shared, np.diag(own), np.full(4, 0.01 * k)))
     fusion = ContactFusion(1.0)
     for at in moments[:-1]:
@@ -116,7 +116,7 @@ def test_torques_that_grow_with_their_lever_are_not_taken_for_a_force_that_grows
     assert ends.count("inner_link") < 4  # 11 if the force of each link grew by its torques
 
 
-@pytest.mark.parametrize(("change", "least", "most"), [(-1.0, 1, 1), (2.0, CONTACT.moments + 1, 9)])
+@pytest.mark.parametrize(("change", "least", "most"), [(-1.0, 1, 1), (2.0, CONTACT.instants + 1, 9)])
 def test_a_force_that_grows_is_followed_at_once_and_one_from_another_side_forgets_the_one_before(
     change: float, least: int, most: int
 ) -> None:

@@ -4,7 +4,7 @@
 ``contact_estimator``       what touches the arm: observer, detection and inference together
 ``contact_estimator_node``  the node
 ``contact_fit``             the probability of contact positions along straight links
-``contact_fusion``          several moments of one contact that explain it together
+``contact_fusion``          several instants of one contact that explain it together
 ``contact_inference``       which link is touched, where and how hard
 ``contact_table``           hypotheses as rows of numbers, as the topic carries them, and back
 ``error_effects``           how the errors of the model act on the torques

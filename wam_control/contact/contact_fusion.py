@@ -1,22 +1,22 @@
-"""Several moments of one contact that explain it together.
+"""Several instants of one contact that explain it together.
 
-While a contact lasts, part of the errors of its torques changes from moment to moment (cogging, noise, friction of a
-motor that has moved on), and part stays (a wrong friction level, a shaft at rest).  The torques of some moments, each
-4 numbers of an arm of 4 joints, are taken as one measurement of 4 numbers per moment, with the covariance of both:
+While a contact lasts, part of the errors of its torques changes from instant to instant (cogging, noise, friction of a
+motor that has moved on), and part stays (a wrong friction level, a shaft at rest).  The torques of some instants, each
+4 numbers of an arm of 4 joints, are taken as one measurement of 4 numbers per instant, with the covariance of both:
 
     C_jk = H_j P H_k^T + L_j L_k^T + delta_jk R_j,
 
-H the effects of the model's errors and P their covariance, which are the same in all moments; L the errors of shafts at
+H the effects of the model's errors and P their covariance, which are the same at all instants; L those of shafts at
 rest or just reversed.  These may stay or change: they count as both, in L and in R.  One contact position explains all
-moments, by a force on each link that grows and shrinks as the torques do, over those of the same force in each pose;
+instants, by a force on each link that grows and shrinks as the torques do, over those of the same force in each pose;
 how else it may change is in the covariance, too, by the links' probabilities: its direction by a fraction of its size,
 its position by the way that the arm has moved since, and by the speed of a contact that slides along its link.  Few
-slide: how probable that is follows from the same moments, by how much better a speed explains them, whatever the force
+slide: how probable that is follows from the same instants, by how much better a speed explains them, whatever the force
 and the position.
 How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
 `freedom` degrees of freedom of the statement itself.
 
-The inner products of `ContactFit` are all that a fit needs, of any number of rows.  Those of the past moments are
+The inner products of `ContactFit` are all that a fit needs, of any number of rows.  Those of the past instants are
 computed when one joins them; with the present one, of covariance C_nn, they are those of (Rasmussen & Williams,
 2006, A.6) Z_n - C_np C_pp^-1 Z_p with C_nn - C_np C_pp^-1 C_pn, added to those of the past.
 """
@@ -47,7 +47,7 @@ class Torques(NamedTuple):
     residual : (n,), N m.
     effects : (n, k), N m, of errors that stay, of the covariance `covariance`.
     covariance : (k, k).
-    own : (n, n), N^2 m^2, covariance of the errors of this moment alone.
+    own : (n, n), N^2 m^2, covariance of the errors of this instant alone.
     pose : (n,), rad.
     """
 
@@ -65,21 +65,21 @@ class _Seen(NamedTuple):
 
 
 class _Past(NamedTuple):
-    """What past moments contribute; their forces in units of `forces`, each of its link.
+    """What past instants contribute; their forces in units of `forces`, each of its link.
 
     `gram` (links, 7, 7) of them alone; `predicts` (links, k, 7) and `explains` (k, k): C_np C_pp^-1 Z_p and
-    C_np C_pp^-1 C_pn without the effects of the present moment at their outer sides.
+    C_np C_pp^-1 C_pn without the effects of the present instant at their outer sides.
     """
 
     gram: Array
     predicts: Array
     explains: Array
     expected: float  # chi^2 of the errors alone, without what the force may have changed
-    last: Torques  # of the last moment
+    last: Torques  # of the last instant
     places: Array  # (links,), m
-    forces: Array  # (links, 3), N, across and along, there, by the torques of the last moment
+    forces: Array  # (links, 3), N, across and along, there, by the torques of the last instant
     slope: Array  # (links, n), N m per m of its contact position, by the square roots of the links' probabilities
-    moments: int
+    instants: int
 
 
 class ContactFusion:
@@ -87,11 +87,11 @@ class ContactFusion:
 
     Parameters
     ----------
-    duration : s, for which a moment counts; 0 for the present one alone.
+    duration : s, for which an instant counts; 0 for the present one alone.
 
     Attributes
     ----------
-    count : number of moments that explain the present contact together.
+    count : number of instants that explain the present contact together.
     """
 
     def __init__(self, duration: float) -> None:
@@ -101,18 +101,18 @@ class ContactFusion:
     def reset(self) -> None:
         """The contact has ended, or is another one."""
         self._last: _Seen | None = None  # its errors are still those of the present one
-        self._moments: deque[_Seen] = deque()
+        self._instants: deque[_Seen] = deque()
         self._past: _Past | None = None
         self._widening = 1.0
         self._speed = _speed(CONTACT.slide_probability)
         self.count = 1
 
     def gram(self, rows: Array, now: Torques) -> Array | None:
-        """Inner products of all moments, (links, 7, 7); None for no past, another contact, or where rounding decides.
+        """Inner products of all instants, (links, 7, 7); None for no past, another contact, or where rounding decides.
 
         Parameters
         ----------
-        rows : (links, 7, n), those of `ContactFit` of the present moment; the last link may be a payload.
+        rows : (links, 7, n), those of `ContactFit` of the present instant; the last link may be a payload.
         now : its torques.
         """
         past = self._past
@@ -139,42 +139,42 @@ class ContactFusion:
         if (found - found.transpose(0, 2, 1)).max() > CONTACT.rounding:
             self.reset()
             return None
-        self.count = 1 + past.moments
+        self.count = 1 + past.instants
         return found
 
     def remember(self, rows: Array, now: Torques, guess: Sequence[tuple[float, float]], residual: float) -> None:
-        """Take the present moment, with what was fitted to it.
+        """Take the present instant, with what was fitted to it.
 
         Parameters
         ----------
         guess : of each link position of the contact, m, and probability.
-        residual : chi^2 of all moments that the fit does not explain.
+        residual : chi^2 of all instants that the fit does not explain.
         """
         if self._past is not None and self.count > 1:
             freedom = max(0.0, self._past.expected + len(now.residual) - CONTACT.unknowns)
             self._widening = (CONTACT.freedom + self._widening * residual) / (CONTACT.freedom + freedom)
             if self._widening > CONTACT.different:
                 self.reset()
-        moments, last = self._moments, self._last
-        is_early = last is not None and now.time - last.torques.time < CONTACT.moment_interval - MOTION.rounding
+        instants, last = self._instants, self._last
+        is_early = last is not None and now.time - last.torques.time < CONTACT.instant_interval - MOTION.rounding
         if is_early or now.own.diagonal().min() < CONTACT.finest_sd**2:
             return
         has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > CONTACT.pose_change
         if has_moved:
-            moments.extend([] if last is None else [last])
+            instants.extend([] if last is None else [last])
             self._last = _Seen(now, rows)
-        count = len(moments)
-        while moments and (len(moments) > CONTACT.moments or now.time - moments[0].torques.time > self._duration):
-            moments.popleft()
-        if has_moved or len(moments) < count:
-            self._past = self._of(list(moments), now, np.array(guess)) if moments else None
+        count = len(instants)
+        while instants and (len(instants) > CONTACT.instants or now.time - instants[0].torques.time > self._duration):
+            instants.popleft()
+        if has_moved or len(instants) < count:
+            self._past = self._of(list(instants), now, np.array(guess)) if instants else None
 
-    def _of(self, moments: list[_Seen], now: Torques, guess: Array) -> _Past:
-        n, past, last = len(now.residual), [moment.torques for moment in moments], moments[-1].torques
+    def _of(self, instants: list[_Seen], now: Torques, guess: Array) -> _Past:
+        n, past, last = len(now.residual), [instant.torques for instant in instants], instants[-1].torques
         effects = np.concatenate([each.effects for each in past])
         shared = effects.dot(last.covariance)
         common = shared.dot(effects.T)
-        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
+        rows = np.stack([instant.rows for instant in instants], axis=2)  # (links, 7, instants, n)
         # a payload has no place, and is not moved
         guess = np.concatenate((guess, np.zeros((len(rows) - len(guess), 2))))
         places, chances, count = guess[:, 0], np.sqrt(guess[:, 1]), len(past)
@@ -184,7 +184,7 @@ class ContactFusion:
         wanted = np.linalg.solve(levers, (present @ last.residual)[..., None])
         forces: Array = np.asarray(wanted[..., 0], np.float64)  # (links, 3), N
         moved = CONTACT.slip * np.abs(np.array([each.pose for each in past]) - now.pose).max(axis=1)
-        elapsed = np.array([now.time + CONTACT.moment_interval - each.time for each in past])
+        elapsed = np.array([now.time + CONTACT.instant_interval - each.time for each in past])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, -1]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
         # by how much the force of each link was larger than `forces`, whose torques would then have been `alike`
@@ -201,7 +201,7 @@ class ContactFusion:
             of = slice(n * j, n * j + n)
             side = turned[:, :, j].reshape(-1, n)
             covariance[of, of] += side.T.dot(side)
-        per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
+        per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, instants, n), N m per m
         link = int(chances.argmax())
         unknown = np.concatenate(
             (
@@ -231,24 +231,28 @@ class ContactFusion:
             places=places,
             forces=forces,
             slope=slope,
-            moments=count,
+            instants=count,
         )
 
 
 def _sides(rows: Array, places: Array) -> tuple[Array, Array]:
-    """Torques of a force across a link and along it, (links, 3, moments, n), m, and those across per metre, (2)."""
+    """Torques of a force across a link and along it, (links, 3, instants, n), m, and those across per metre, (2)."""
     sides, slopes = rows[:, [1, 2, 6]], rows[:, 3:5]
     sides[:, :2] += places[:, None, None, None] * slopes
     return sides, slopes
 
 
 def _grown(torques: Array, alike: Array, covariance: Array, slips: Array) -> Array:
-    """Forces over those of which torques are given, (links,), by torques, (n,); as likely twice as large as gone.
+    """By which factor g the force on each link has grown, (links,): torques = g alike + errors, with the prior 1 +- 1.
+
+    g = (a' W t + 1)/(a' W a + 1) of the torques t and a, with the inverse W of the covariance of the errors.
 
     Parameters
     ----------
-    alike : (links, n), N m.
-    slips : (k, n), N m, by which each may differ apart from that.
+    torques : (n,), N m.
+    alike : (links, n), N m, of the force before it has grown.
+    covariance : (n, n), N^2 m^2, of the errors.
+    slips : (k, n), N m, further independent errors of one sd.
     """
     weighted = alike.dot(inverse(covariance + slips.T.dot(slips)))
     found: Array = (weighted.dot(torques) + 1.0) / ((weighted * alike).sum(axis=1) + 1.0)
@@ -260,7 +264,7 @@ def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> flo
 
     Parameters
     ----------
-    torques : (m,), N m, of all moments.
+    torques : (m,), N m, of all instants.
     covariance : (m, m), N^2 m^2, if it does not slide, whatever its force and position.
     slide : (m,), N m, torques of the standard deviation of its speed.
     """

@@ -122,7 +122,7 @@ class ModelErrors:
         return torques, self.size * covariance
 
     def zero(self, seen: Observation, detect: float) -> None:
-        """Take a moment at rest as one of an arm that nothing touches.
+        """Take an instant at rest as one of an arm that nothing touches.
 
         What would count as a contact shows that the errors of the model are larger than was thought.
 

@@ -30,27 +30,27 @@ class ContactThresholds:
     smallest_sd: float = 1e-4
     # probability of a force along the tube above which that is a reason why the link is not identified
     noted_probability: float = 0.05
-    # several moments of one contact
-    # s, between moments: one and a half time constants of the observer, within which errors are alike; the contact
+    # several instants of one contact
+    # s, between instants: one and a half time constants of the observer, within which errors are alike; the contact
     # moves on so long after the last one
-    moment_interval: float = 0.03
-    moments: int = 6  # past moments
-    # N m, sd of the errors of one moment, below which rounding decides what moments have in common
+    instant_interval: float = 0.03
+    instants: int = 6  # past ones
+    # N m, sd of the errors of one instant, below which rounding decides what instants have in common
     finest_sd: float = 1e-3
     # difference of inner products that are equal but for rounding, above which it decides what they are
     rounding: float = 1e-4
     pose_change: float = 2e-3  # rad, of any joint: another pose. In one pose the errors of the model stay
-    force_turn: float = 0.15  # of the size of the force: sd of the change of its components from moment to moment
+    force_turn: float = 0.15  # of the size of the force: sd of the change of its components from instant to instant
     slip: float = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
     drift: float = 0.02  # m/s: the same, of what touches an arm that does not move
     slide_speed: float = 0.5  # m/s: sd of the speed along its link of a contact that slides
     slide_probability: float = 0.05  # probability of such a contact
     any_force: float = 2.0  # of its size: sd of the force of a contact, where only its speed counts
     any_position: float = 0.1  # m: sd of the position of a contact, where only its speed counts
-    most_growth: float = 4.0  # by which the torques of a contact grow or fall from its last moment
+    most_growth: float = 4.0  # by which the torques of a contact grow or fall from its last instant
     freedom: float = 10.0  # degrees of freedom
     unknowns: int = 3  # of a contact: its position and the force across the link
-    different: float = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
+    different: float = 4.0  # chi^2 per degree of freedom above which instants are not of the same contact
     # errors of the model
     learn_interval: float = 0.01  # s, between samples that are learned from
     hindsight: float = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
