@@ -289,11 +289,11 @@ class Interface:
                 waiting += [trigger for trigger in triggers if trigger not in passed]
         return frozenset(found)
 
-    def silent(self, ages: Mapping[str, float]) -> tuple[list[str], list[str]]:
+    def silent(self, ages: Mapping[str, float]) -> tuple[list[str], list[str], list[str]]:
         """Which topics are lost, and which nodes must have ended for it while the other topics still come.
 
         A node that still answers in one of the topics that come cannot be it; one that all lost topics have in
-        common explains them best.
+        common explains them best.  The others, which would explain them together, come last.
 
         Parameters
         ----------
@@ -305,7 +305,9 @@ class Interface:
         suspects = [self.upstream(topic) for topic in lost]
         every: frozenset[str] = frozenset().union(*suspects)
         alive: frozenset[str] = frozenset().union(*(self.upstream(topic) for topic in present))
-        return lost, sorted(every.intersection(*suspects) - alive or every - alive or every)
+        stopped = every.intersection(*suspects) - alive or every - alive or every
+        others = every - alive - stopped
+        return lost, sorted(stopped), sorted(others) if all(map(others.intersection, suspects)) else []
 
     def unanswered(self, topics: Collection[str], awaited: Mapping[str, Collection[str]]) -> dict[str, list[str]]:
         """The nodes that are the reason why topics do not come, each with what it should have published.

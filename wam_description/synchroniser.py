@@ -124,7 +124,7 @@ class Synchroniser:
         begin : first state of the session, ns; nothing can come in answer to one before it.
         """
         self._announced = None
-        self._last = self._last_done = self._suspect = 0
+        self._first = self._last = self._last_done = self._suspect = 0
         self._triggers.clear()
         self._lacks = None
         for group in self._groups:
@@ -235,6 +235,7 @@ class Synchroniser:
         ):
             return ()
         self._last, self._suspect = stamp, 0
+        self._first = self._first or stamp
         if not self._triggers:  # most often: nothing waits, and all inputs are there
             if (inputs := self._inputs(stamp, value)) is not None:
                 return (inputs,)
@@ -324,11 +325,13 @@ class Synchroniser:
         return [] if due <= self._last <= now else [self._trigger]  # what came after `now` is of an earlier session
 
     def ages(self) -> dict[str, float]:
-        """How old the inputs are that no step waits for and that have come, as parts of their limits, by topic."""
+        """How old the inputs are that no step waits for, as parts of their limits, by topic.
+
+        One that has not come is as old as the first state: nobody else would notice that its sender is not there.
+        """
         return {
-            topic: (self._last - newest.stamp) / newest.spec.limit_ns
+            topic: (self._last - (newest.stamp or self._first)) / newest.spec.limit_ns
             for topic, newest in self._newest.items()
-            if newest.stamp
         }
 
     def _inputs(self, stamp: int, value: Any) -> Inputs | None:

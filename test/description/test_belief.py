@@ -95,6 +95,14 @@ def test_a_single_command_does_nothing_and_a_stream_without_stamps_counts() -> N
     assert node.state(40) is None, "its age counts from its arrival"
 
 
+def test_an_input_that_never_comes_is_as_old_as_the_first_state() -> None:
+    arm = Realtime(FEEDBACK)
+    for _ in range(2):
+        arm.state(9)
+        assert arm.synchroniser.ages() == {"input": 1.0}
+        arm.synchroniser.restart()
+
+
 def test_a_step_that_a_program_starts_has_the_states_of_another_step_as_its_clock() -> None:
     clock = Synchroniser(REALTIME, "state", {})
     step = Synchroniser(REALTIME, "command", {}, started=FEEDBACK._replace(streamed=False), clock=clock)
@@ -184,8 +192,8 @@ def test_a_new_driver_takes_a_number_that_no_node_follows() -> None:
     ],
 )
 def test_the_node_that_has_stopped_is_named(ages: dict[str, float], silent: list[str]) -> None:
-    lost, nodes = Interface(WAM.shared).silent(ages)
-    assert nodes == silent
+    lost, nodes, others = Interface(WAM.shared).silent(ages)
+    assert (nodes, others) == (silent, ["force_loop", "gravity"] * (silent == ["transform"]))
     assert (len(lost) == 2) is (silent in (["transform"], ["contact_estimator"]))
 
 

@@ -46,7 +46,7 @@ def test_a_node_that_was_started_with_other_values_is_named_with_them(other: dic
     assert reason == f"gravity was started with {names} the driver; start all nodes with the same configuration"
 
 
-def test_what_concerns_one_process_may_differ() -> None:
+def test_what_concerns_one_process_or_is_not_reported_may_differ() -> None:
     other = {
         "nodes": ["driver"], "timing.niceness": 0, "timing.fifo_priority": 1, "timing.timeout": 9.0,
         "timing.real_time_factor": 0.5,
@@ -55,10 +55,8 @@ def test_what_concerns_one_process_may_differ() -> None:
     for name, value in other.items():
         assert listed(values(WAM.shared)[name]) != value, name
         assert disagreement("gravity", OWN, started_with({name: value})) == "", name
-
-
-def test_zero_is_zero_whatever_its_sign() -> None:
     assert disagreement("gravity", started_with({"arm.payload": 0.0}), started_with({"arm.payload": -0.0})) == ""
+    assert disagreement("gravity", OWN, "") == ""
 
 
 def test_every_other_shared_parameter_is_compared() -> None:
@@ -73,10 +71,6 @@ def test_every_other_shared_parameter_is_compared() -> None:
 )
 def test_digests_of_other_parameters_are_those_of_another_version(text: str) -> None:
     assert "gravity was started with another version" in disagreement("gravity", OWN, text)
-
-
-def test_a_node_without_digests_is_not_compared() -> None:
-    assert disagreement("gravity", OWN, "") == ""
 
 
 class Apart(Stack):

@@ -129,6 +129,7 @@ def test_a_node_of_another_name_has_a_process_of_its_own(tmp_path: Path, monkeyp
     assert process_groups(["force_loop", slow, another], GROUPED) == [["force_loop", another], [slow]]
 
 
+MS = 1_000_000
 TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0, 0)
 
 
@@ -140,41 +141,34 @@ def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list
 
 def test_a_step_waits_for_the_command_that_belongs_to_the_state() -> None:
     synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
-    ms = 1_000_000
-    assert puts(synchroniser, "state", 1 * ms, "s1") == [(1 * ms, 0.001, "s1", None)]
-    assert puts(synchroniser, "state", 2 * ms, "s2") == []
-    assert synchroniser.missing(2 * ms) == ["command"]
-    assert puts(synchroniser, "command", 1 * ms, "c1") == [(2 * ms, 0.001, "s2", "c1")]
-    assert puts(synchroniser, "command", 6 * ms, "c6") == []
-    assert puts(synchroniser, "state", 6 * ms, "s6") == [(6 * ms, 0.004, "s6", "c1")]
-    assert puts(synchroniser, "state", 7 * ms, "s7") == [(7 * ms, 0.001, "s7", "c6")]
+    assert puts(synchroniser, "state", 1 * MS, "s1") == [(1 * MS, 0.001, "s1", None)]
+    assert puts(synchroniser, "state", 2 * MS, "s2") == []
+    assert synchroniser.missing(2 * MS) == ["command"]
+    assert puts(synchroniser, "command", 1 * MS, "c1") == [(2 * MS, 0.001, "s2", "c1")]
+    assert puts(synchroniser, "command", 6 * MS, "c6") == []
+    assert puts(synchroniser, "state", 6 * MS, "s6") == [(6 * MS, 0.004, "s6", "c1")]
+    assert puts(synchroniser, "state", 7 * MS, "s7") == [(7 * MS, 0.001, "s7", "c6")]
 
 
 def test_a_node_that_begins_late_leaves_out_the_steps_whose_inputs_it_has_missed() -> None:
     synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
-    ms = 1_000_000
     for tick in (1003, 1004, 1005, 1006):  # they need the command of 1001
-        assert puts(synchroniser, "state", tick * ms, f"s{tick}") == []
-    assert puts(synchroniser, "command", 1006 * ms, "c1006") == []
-    assert puts(synchroniser, "state", 1007 * ms, "s1007") == [(1007 * ms, 0.001, "s1007", "c1006")]
+        assert puts(synchroniser, "state", tick * MS, f"s{tick}") == []
+    assert puts(synchroniser, "command", 1006 * MS, "c1006") == []
+    assert puts(synchroniser, "state", 1007 * MS, "s1007") == [(1007 * MS, 0.001, "s1007", "c1006")]
 
 
 def test_a_step_waits_fifty_periods_for_the_answer_to_an_earlier_state_and_then_does_without() -> None:
     """Two nodes that wait for each other, of which one has missed a state, go on."""
     synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=5)})
-    ms = 1_000_000
-    puts(synchroniser, "state", 1 * ms, "s1")
-    puts(synchroniser, "command", 1 * ms, "c1")
+    late = [((11 + i) * MS, 0.001, "s", "c1") for i in range(5)]
+    expected = {10: [(10 * MS, 0.001, "s", "c1")], 56: [], 57: late}
+    puts(synchroniser, "state", 1 * MS, "s1")
+    puts(synchroniser, "command", 1 * MS, "c1")
     for tick in range(6, 61):  # they need the answers to 1, 6, 11 ...; that to 6 never comes
-        made = puts(synchroniser, "state", tick * ms, "s")
-        if tick in (10, 56, 57):
-            expected = {
-                10: [(10 * ms, 0.001, "s", "c1")],
-                56: [],
-                57: [((11 + i) * ms, 0.001, "s", "c1") for i in range(5)],
-            }
-            assert made == expected[tick]
-    assert puts(synchroniser, "command", 11 * ms, "c11")[0][2:] == ("s", "c11")
+        made = puts(synchroniser, "state", tick * MS, "s")
+        assert made == expected.get(tick, made)
+    assert puts(synchroniser, "command", 11 * MS, "c11")[0][2:] == ("s", "c11")
 
 
 def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:
@@ -210,11 +204,10 @@ def test_an_outer_step_takes_states_and_inputs_of_outer_periods_only(delay: int,
 def test_an_outer_step_waits_for_its_inputs_of_both_rates_and_leaves_out_what_one_of_them_has_missed() -> None:
     specs = {"sensors": InputSpec(outer=False), "estimate": InputSpec(outer=True)}
     synchroniser = Synchroniser(TIMING, "state", specs, outer=True)
-    ms = 1_000_000
-    assert list(synchroniser.inlets["state"](1 * ms, "s1")) == []
+    assert list(synchroniser.inlets["state"](1 * MS, "s1")) == []
     for tick in range(1, 7):
-        assert list(synchroniser.inlets["sensors"](tick * ms, tick)) == []
-    assert synchroniser.missing(1 * ms) == ["estimate"]
-    assert list(synchroniser.inlets["state"](6 * ms, "s6")) == []
-    (inputs,) = synchroniser.inlets["estimate"](6 * ms, "e6")  # that of the first one can no longer come
+        assert list(synchroniser.inlets["sensors"](tick * MS, tick)) == []
+    assert synchroniser.missing(1 * MS) == ["estimate"]
+    assert list(synchroniser.inlets["state"](6 * MS, "s6")) == []
+    (inputs,) = synchroniser.inlets["estimate"](6 * MS, "e6")  # that of the first one can no longer come
     assert (inputs["state"], inputs["sensors"], inputs["estimate"]) == ("s6", 6, "e6")
