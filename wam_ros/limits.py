@@ -34,6 +34,7 @@ class NodeLimits:
 class ProcessLimits:
     """Processes of nodes: their end and their processors."""
 
+    pulse: float = 0.1  # s, after which an executor is woken, and a timer is called, whose wait has not ended by itself
     arrived: float = 0.5  # s, for what has arrived before the end
     # s, for the last messages of all nodes of this process together; only a listener that is frozen needs it
     delivery: float = 4.0

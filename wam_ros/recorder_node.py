@@ -62,7 +62,7 @@ class RecorderNode(StackNode):
         self.create_timer(RECORDER_LIMITS.drain_period, self._drain)
         self.create_timer(0.1, self.attend)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
-            self.create_timer(1.0, lambda: self.health.report(time.time_ns(), self._facts))
+            self.create_timer(1.0, lambda: self.health.report(time.monotonic_ns(), self._facts))
         self.get_logger().info(f"recording to {self.bag.path}")
 
     def destroy_node(self) -> None:

@@ -25,7 +25,7 @@ from wam_ros.limits import NODE_LIMITS, PROCESS_LIMITS
 from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, leaving
 from wam_ros.processors import keep_to_processors
-from wam_ros.ros_topics import NAMESPACE
+from wam_ros.ros_topics import NAMESPACE, SECOND
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST = "recorder"  # to be stopped: it closes the bag
@@ -129,6 +129,24 @@ class Connection(Closing):
         self.listener_gone = False
         self.nodes: dict[str, Any] = {}
         self._nodes: list[Node] = []
+        self._pulse_end = threading.Event()
+        self._pulse = threading.Thread(target=self._keep_awake, name="pulse", daemon=True)
+        self._pulse.start()
+
+    def _keep_awake(self) -> None:
+        """Wake the executor now and then: the wheels of ROS wait by the wall clock, so for hours if it is set back."""
+        task = None
+        while not self._pulse_end.wait(PROCESS_LIMITS.pulse):
+            if task is None or task.done():
+                task = self.executor.create_task(self._call_overdue)
+
+    def _call_overdue(self) -> None:
+        """Call the timers that were due before the last pulse, and begin their waits again: each has one of its own."""
+        for node in self._nodes:
+            for timer in node.timers:
+                if not timer.is_canceled() and timer.time_until_next_call() < -PROCESS_LIMITS.pulse * SECOND:
+                    timer.reset()
+                    self.executor.create_task(timer.callback)
 
     def make(self, makers: Mapping[str, MakeNode], namespace: str = NAMESPACE, is_split: bool = False) -> None:
         """Make nodes that hand each other their messages; where one cannot be made, all is closed.
@@ -169,7 +187,7 @@ class Connection(Closing):
         """
         executor = self.executor
         while not until():
-            executor.spin_once(timeout_sec=0.1)
+            executor.spin_once(timeout_sec=PROCESS_LIMITS.pulse)
         end()
         future: rclpy.Future[None] = rclpy.Future()
         limit = threading.Timer(PROCESS_LIMITS.arrived, executor.create_task, [future.set_result, None])
@@ -181,6 +199,8 @@ class Connection(Closing):
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last, and leave the network."""
         limits = PROCESS_LIMITS
+        self._pulse_end.set()
+        self._pulse.join()
         self.context.end = time.monotonic() + (limits.short_delivery if self.listener_gone else limits.delivery)
         for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
             self.remove(node)

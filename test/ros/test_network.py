@@ -99,11 +99,8 @@ def said(process: subprocess.Popen[str]) -> str:
 
 
 def wait_for_place(domain: int, namespace: str, name: str, process: subprocess.Popen[str]) -> None:
-    end = time.monotonic() + LONG
-    while not occupant(domain, namespace, name):
-        assert process.poll() is None, said(process)
-        assert time.monotonic() < end
-        time.sleep(0.05)
+    wait(lambda: occupant(domain, namespace, name) or process.poll() is not None, f"node {name}")
+    assert process.poll() is None, said(process)
 
 
 def bound(domain: int) -> list[tuple[str, int]]:

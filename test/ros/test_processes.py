@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import pytest
 from conftest import LONG, ran, soon, wait
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool
+from test_own_controller import Echo
 
 from wam_bag.bag import read
 from wam_cli.main import main
@@ -103,6 +105,11 @@ def up(started: Callable[..., Stack], *arguments: str) -> Stack:
 
 def recorded(stack: Stack) -> int:
     return sum(file.stat().st_size for file in stack.output.parent.glob("bags/*/*.mcap"))
+
+
+def spin(composition: Composition, until: Callable[[], bool], seconds: float = LONG) -> None:
+    end = time.monotonic() + seconds
+    composition.spin(lambda: until() or time.monotonic() > end)
 
 
 def statuses(folder: Path, node: str) -> list[str]:
@@ -402,41 +409,17 @@ def test_wrong_ros_arguments_end_a_program_with_one_line(
     assert "\n" not in str(ended.value)
 
 
-OWN = """
-from wam_description.parameters import Nothing
-from wam_description.topics import JOINT_STATE, Topic
-from wam_description.wiring import Input, reaction
-
-
-class Echo:
-    name, parameters = "echo", Nothing
-    topics = (Topic("echo", JOINT_STATE, "outer", "the torques of gravity, N m", "joints"),)
-
-    def __init__(self, shared, own):
-        pass
-
-    @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
-    def step(self, inputs):
-        return {"echo": inputs["gravity_effort"]}
-"""
-
-
-def test_record_takes_mode_and_nodes_from_the_running_stack(
-    started: Any, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    mode = "realtime"
-    (tmp_path / "own_echo.py").write_text(OWN)
-    monkeypatch.syspath_prepend(tmp_path)
-    configured = Configuration.load(packaged("wam")).with_nodes("own_echo:Echo").with_values({"timing.mode": mode})
-    path = os.pathsep.join([str(ROOT), str(tmp_path)])
+def test_record_takes_mode_and_nodes_from_the_running_stack(started: Any, tmp_path: Path, domain_id: int) -> None:
+    mode, echo = "realtime", f"{Echo.__module__}:Echo"
+    configured = Configuration.load(packaged("wam")).with_nodes(echo).with_values({"timing.mode": mode})
+    path = os.pathsep.join([str(ROOT), str(ROOT / "test" / "ros")])
     with Composition(configured, "left", domain_id) as composition:
         words = ("--name", "mine", "--set", f"recorder:directory={tmp_path / 'bags'}", "--namespace", "left")
         stack = started("-m", "wam_cli.main", "bag", "record", *words, PYTHONPATH=path)
-        begin = time.monotonic()
-        composition.spin(lambda: recorded(stack) > 100_000 or time.monotonic() - begin > LONG)
+        spin(composition, lambda: recorded(stack) > 100_000)
         assert recorded(stack) > 100_000, stack.said()
         stack.process.send_signal(signal.SIGINT)
-        composition.spin(lambda: stack.process.poll() is not None or time.monotonic() - begin > LONG)
+        spin(composition, lambda: stack.process.poll() is not None)
     assert stack.process.returncode == 0, stack.said()
     nodes = "driver, transform, velocity_loop, gravity, force_loop, contact_estimator, echo"
     assert stack.said().startswith(f"the stack in /left runs in {mode}: {nodes}\n")
@@ -463,13 +446,12 @@ def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, 
     configured = base.with_values({"nodes": [*base.shared.nodes, "scenario"], "scenario:script": str(script)})
     with Composition(configured, domain_id=domain_id) as composition:
         driver: Any = composition.nodes["driver"]
-        begin = time.monotonic()
-        composition.spin(lambda: driver.driver.stamp > 20_000_000 or time.monotonic() - begin > LONG)
+        spin(composition, lambda: driver.driver.stamp > 20_000_000)
         driver.time.pause(True)
-        composition.spin(lambda: time.monotonic() - begin > 0.1)
+        spin(composition, lambda: False, 0.1)
         driver.trip(fault("test", reason="two publishers send motor_current_command"))
         scenario: Any = composition.nodes["scenario"]
-        composition.spin(lambda: scenario.done or time.monotonic() - begin > LONG)
+        spin(composition, lambda: scenario.done)
         assert scenario.failure == "the driver stopped in step 'wait': two publishers send motor_current_command"
 
 
@@ -524,14 +506,12 @@ def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     patience = 4.0  # s; each of the six nodes would wait as long
     monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=patience))
     configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
-    begin = time.monotonic()
     with Composition(configured, domain_id=domain_id) as composition:
         listener = started("-m", "wam_cli.main", "bag", "record", "--name", "outside")
-        composition.spin(lambda: recorded(listener) > 100_000 or time.monotonic() - begin > LONG)
+        spin(composition, lambda: recorded(listener) > 100_000)
         assert recorded(listener) > 100_000, listener.said()
         listener.process.send_signal(signal.SIGSTOP)
-        begin = time.monotonic()
-        composition.spin(lambda: time.monotonic() - begin > 0.1)
+        spin(composition, lambda: False, 0.1)
         begin = time.monotonic()
     took = time.monotonic() - begin
     listener.process.send_signal(signal.SIGCONT)
@@ -546,22 +526,17 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
     configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
     with Composition(configured, domain_id=domain_id) as composition:
         published = composition.nodes["driver"].outlets.written
-
-        def spin_until(is_enough: Callable[[], bool], seconds: float) -> None:
-            end = time.monotonic() + seconds
-            composition.spin(lambda: is_enough() or time.monotonic() > end)
-
         listener = started("-m", "wam_cli.main", "bag", "record", "--name", "outside")
-        spin_until(lambda: recorded(listener) > 40_000, LONG)
+        spin(composition, lambda: recorded(listener) > 40_000)
         assert recorded(listener) > 40_000, listener.said()
         listener.process.send_signal(signal.SIGSTOP)
-        spin_until(lambda: False, 0.2)
+        spin(composition, lambda: False, 0.2)
         before = published["status"]
         begin = time.monotonic()
-        spin_until(lambda: False, 1.5)  # about 30 periods of the repetition
+        spin(composition, lambda: False, 1.5)  # about 30 periods of the repetition
         while_frozen, frozen = published["status"] - before, time.monotonic() - begin
         listener.process.send_signal(signal.SIGCONT)
-        spin_until(lambda: published["status"] > before + while_frozen + 10, LONG)
+        spin(composition, lambda: published["status"] > before + while_frozen + 10, LONG)
         after = published["status"] - before - while_frozen
     assert 1 <= while_frozen <= frozen / 0.2 + 2
     assert after > 10
@@ -574,3 +549,43 @@ def test_a_node_without_a_package_that_it_needs_ends_with_one_line(tmp_path: Pat
     assert done.returncode == 1
     assert done.stderr.startswith("wam node: it needs 'pinocchio', which is not installed; ")
     assert len(done.stderr.splitlines()) == 1
+
+
+SET_BACK = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <unistd.h>
+typedef int Wait(pthread_cond_t *, pthread_mutex_t *, const struct timespec *);
+int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex, const struct timespec *until) {
+  static __thread int waits;  // the first of each thread stands for the one during which the clock was set back
+  struct timespec later = *until;
+  int is_of_wall_clock = until->tv_sec > 1000000000;
+  if (is_of_wall_clock && access(getenv("SET_BACK"), F_OK) == 0 && !waits++) later.tv_sec += 3600;
+  return ((Wait *)dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2"))(condition, mutex, &later);
+}
+"""
+TIMER = """
+import os, sys
+from wam_ros.run import Connection
+from wam_ros.tolerance import TolerantNode
+came = []
+with Connection() as connection:
+    connection.add(TolerantNode("a", context=connection.context)).create_timer(0.005, lambda: came.append(1))
+    connection.spin(lambda: len(came) > 40)
+    open(os.environ["SET_BACK"], "w").close()
+    connection.spin(lambda: len(came) > 80)
+"""
+
+
+@pytest.mark.skipif(
+    shutil.which("cc") is None, reason="without a compiler the clock cannot be set back for one process"
+)
+def test_a_wall_clock_that_is_set_back_stops_no_timer(tmp_path: Path, domain_id: int) -> None:
+    """The wheels of ROS are built against an old C library, whose waits end by the wall clock."""
+    source, library = tmp_path / "set_back.c", tmp_path / "set_back.so"
+    source.write_text(SET_BACK)
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
+    environment = {**os.environ, "LD_PRELOAD": str(library), "SET_BACK": str(tmp_path / "now")}
+    ran("-c", TIMER, check=True, env=environment, timeout=LONG)

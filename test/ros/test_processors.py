@@ -16,6 +16,10 @@ from wam_ros.processors import PROCESSORS, idle_processor, keep_to_processors, p
 
 OWN = os.getpriority(os.PRIO_PROCESS, 0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
+LOCKSTEP, REALTIME = (
+    Configuration.load(packaged("wam")).with_values({"timing.mode": mode, "nodes": ENTRIES})
+    for mode in ("lockstep", "realtime")
+)
 
 
 def test_a_permitted_processor_is_taken_for_the_inner_loop() -> None:
@@ -51,8 +55,7 @@ def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:
 
 def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> None:
     permitted = os.sched_getaffinity(0)
-    configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": ENTRIES})
-    with Processes(configuration) as processes:
+    with Processes(LOCKSTEP) as processes:
         policies = lambda: {policy for threads in placed(processes).values() for policy, _ in threads}  # noqa: E731
         wait(lambda: policies() == {os.SCHED_BATCH}, "threads keep another policy")
         found = placed(processes)
@@ -65,17 +68,13 @@ def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> Non
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
-REALTIME = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ENTRIES})
-
-
 @pytest.mark.parametrize(("how", "inner"), [(EACH, {"driver", "velocity_loop"}), (GROUPED, {"driver velocity_loop"})])
 def test_in_lockstep_the_inner_loop_has_a_processor_and_all_others_the_rest(
     how: str, inner: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(processors.os, "sched_getaffinity", lambda _: {0, 1, 2})
     monkeypatch.setattr(processors, "idle_processor", lambda: 2)
-    lockstep = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": ENTRIES})
-    found = {" ".join(group): place[PROCESSORS] for group, place in placed_groups(lockstep.shared, how)}
+    found = {" ".join(group): place[PROCESSORS] for group, place in placed_groups(LOCKSTEP.shared, how)}
     assert found == {name: "2" if name in inner else "0 1" for name in found}
     assert inner < found.keys()
 

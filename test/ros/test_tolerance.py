@@ -172,14 +172,9 @@ def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, cap
     assert 1 <= len(lines) <= 3
     assert sum(map(len, lines)) < 3000
     assert gravity.health.refusals["joint_states"].count == 500
-
-
-def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: Any, tmp_path: Path, capfd: Any) -> None:
-    loop = make(ros, tmp_path, "force_loop", ["force_loop"])
-    capfd.readouterr()
-    for topic in ("joint_states", "force_command", "joint_posture_command"):
+    for topic in ("joint_states", "joint_torque", "joint_posture"):  # in the same way, as on a busy machine
         for _ in range(10):
-            loop.health.refuse(topic, "stamp 1 ns is ahead", is_reported=True)
+            gravity.health.refuse(topic, "stamp 1 ns is ahead", is_reported=True)
     (line,) = (line for line in capfd.readouterr().err.splitlines() if "refused" in line)
     assert "joint_states: refused: stamp 1 ns is ahead" in line
 
