@@ -90,7 +90,7 @@ class StackNode(TolerantNode):
         super().__init__(declaration.name, **ros)
         self.shared, self.own = declare(self, declaration.parameter_class)
         if self.is_alone:
-            self._place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
+            self.place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
         self.interface = Interface(self.shared, started_by_hand=declaration)
         topics = self.interface.topics
         rows = [topics[topic] for topic in declaration.outputs if topic in topics]
@@ -172,4 +172,3 @@ class StackNode(TolerantNode):
         self.outlets.wait_for_delivery()
         self.inlets.close()
         super().destroy_node()
-        self._place.close()

@@ -26,6 +26,7 @@ from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, leaving
 from wam_ros.processors import keep_to_processors
 from wam_ros.ros_topics import NAMESPACE, SECOND
+from wam_ros.tolerance import LeavingNode
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST = "recorder"  # to be stopped: it closes the bag
@@ -51,12 +52,14 @@ class StackContext(Context):
     ----------
     bus : that hands on what only nodes of this process publish; None where there is none.
     names : of these nodes.
+    begun : nodes of ours that have not been destroyed.
     end : see `end_of_delivery`.
     failure : why one of its nodes has failed, '' where none has: with it the end is bounded, see `leaving`.
     """
 
     bus: QueuedBus | None = None
     names: frozenset[str] = frozenset()
+    begun: set[Any]
     end: float
     failure: Callable[[], str]
 
@@ -115,6 +118,7 @@ class Connection(Closing):
         limit_to_this_machine(os.environ)
         prepare_logging_directory()
         self.context = StackContext()
+        self.context.begun = set()
         rclpy.init(
             args=list(arguments),
             context=self.context,
@@ -163,6 +167,8 @@ class Connection(Closing):
             for name, make in makers.items():
                 self.nodes[name] = self.add(make(context=self.context, namespace=namespace))
         except BaseException:
+            for node in self.context.begun.difference(self._nodes):  # half made: it lacks what its own end would use
+                LeavingNode.destroy_node(node)
             self.close()
             raise
 

@@ -15,18 +15,33 @@ from wam_bag.printable import printable
 from wam_description.defects import UnusableOutput
 from wam_description.wiring import raised
 from wam_ros.limits import NODE_LIMITS
+from wam_ros.network import Place
 from wam_ros.process_signals import leaving
 
 _READABLE: Final = frozenset(kind.value for kind in Parameter.Type)
 
 
 class LeavingNode(Node):
-    """Leaves the network within the time of `leaving`."""
+    """Leaves the network within the time of `leaving`; its context knows it, also where a subclass fails to make it.
+
+    Attributes
+    ----------
+    place : of its name, which becomes free with it; None where others may have the same.
+    """
+
+    place: Place | None = None
+
+    def __init__(self, *name: str, **ros: Any) -> None:
+        super().__init__(*name, **ros)
+        getattr(self.context, "begun", set()).add(self)
 
     def destroy_node(self) -> None:
         """As that of rclpy."""
+        getattr(self.context, "begun", set()).discard(self)
         with leaving(self.context):
             super().destroy_node()
+        if self.place:
+            self.place.close()
 
 
 class TolerantNode(LeavingNode):

@@ -16,6 +16,7 @@ from wam_description.parameters import Nothing, ParameterError, parameter
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, JOINT_STATE, TASK_COLUMNS, Topic
 from wam_description.wiring import Input, Inputs, Outputs, reaction
+from wam_ros.network import is_inhabited, requested_domain
 from wam_ros.testing import ArmFault, RunningArm, configured
 from wam_ros.wire import encoder
 
@@ -241,8 +242,10 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
     ],
 )
 def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text: str, arm: RunningArm) -> None:
-    with pytest.raises(ParameterError, match=text):
+    with pytest.raises(ParameterError, match=text) as kept:
         arm.start(**values)
+    assert not is_inhabited(requested_domain()), f"a node that was half made is left, after {kept}"
+    arm.start()
 
 
 def test_a_stack_that_has_ended_has_no_truth_and_is_not_started_again(arm: RunningArm) -> None:
