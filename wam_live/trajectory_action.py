@@ -26,7 +26,8 @@ from wam_description.topics import BY_NAME, STATUS
 from wam_live.thresholds import LIVE
 from wam_ros.client import run_next_to
 from wam_ros.messages import Refused, WrongNames, message_type, read_status, read_trajectory
-from wam_ros.ros_topics import qos
+from wam_ros.ros_topics import header, qos
+from wam_ros.wire import decoder, stamp_in
 
 ACTION: Final = "follow_joint_trajectory"
 TOPIC: Final = "joint_trajectory"
@@ -52,7 +53,8 @@ class TrajectoryActionNode(Node):
             self, FollowJointTrajectory, ACTION, self._follow, cancel_callback=lambda _: CancelResponse.ACCEPT
         )
         states, status = BY_NAME["joint_states"], BY_NAME[STATUS]
-        self.create_subscription(JointState, "joint_states", self._take, qos(states))
+        self._decode = decoder(states, shared, "position velocity")
+        self.create_subscription(JointState, "joint_states", self._take, qos(states), raw=True)
         self.create_subscription(message_type(status), STATUS, self._take_status, qos(status))
 
     def destroy_node(self) -> None:
@@ -117,9 +119,14 @@ class TrajectoryActionNode(Node):
                 raise Refused(f"the tolerance of {one.name} names an acceleration, which is not measured; send 0")
         return {one.name: JointTolerance(one.position, one.velocity) for one in tolerances}
 
-    def _take(self, message: JointState) -> None:
-        """Go on with the goal: the answer to each state of the arm."""
-        stamp, before = Time.from_msg(message.header.stamp).nanoseconds, self._stamp
+    def _take(self, data: bytes) -> None:
+        """Go on with the goal: the answer to each state of the arm; one of another program may be none."""
+        try:
+            joints = self._decode(data)
+        except Refused as reason:
+            self.get_logger().warning(f"joint_states: refused: {reason}", once=True)
+            return
+        stamp, before = stamp_in(data), self._stamp
         self._stamp, self._last = stamp, time.monotonic()
         following = self._goal
         if following is None:
@@ -127,21 +134,19 @@ class TrajectoryActionNode(Node):
         if following.handle.is_cancel_requested:
             self._end(GoalEnd(GoalCode.SUCCESSFUL, "canceled; the arm stops"))
             return
-        order = [list(message.name).index(name) for name in self._names]
-        joints = State([message.position[k] for k in order], [message.velocity[k] for k in order], [])
         dt = (stamp - before) / 1e9 if 0 < before < stamp else 0.0
         end = following.goal.step(joints, dt)
         if end is not None:
             self._end(end)
             return
         trajectory = following.handle.request.trajectory
-        trajectory.header.stamp = message.header.stamp
+        trajectory.header.stamp = header(stamp).stamp
         following.publisher.publish(trajectory)
         if stamp - following.reported >= LIVE.feedback * 1e9 and following.goal.desired:
             following.reported = stamp
-            following.handle.publish_feedback(self._feedback(message, joints, following.goal))
+            following.handle.publish_feedback(self._feedback(stamp, joints, following.goal))
 
-    def _feedback(self, message: JointState, joints: State, goal: TrajectoryGoal) -> Any:
+    def _feedback(self, stamp: int, joints: State, goal: TrajectoryGoal) -> Any:
         desired, actual = goal.desired, Moving(joints.position, joints.velocity)
         assert desired is not None
         error = Moving(*([b - a for a, b in zip(*pair, strict=True)] for pair in zip(actual, desired, strict=True)))
@@ -151,7 +156,7 @@ class TrajectoryActionNode(Node):
             point.time_from_start.sec = int(goal.time)
             point.time_from_start.nanosec = int(goal.time % 1.0 * 1e9)
         feedback = FollowJointTrajectory.Feedback(joint_names=self._names)
-        feedback.header.stamp = message.header.stamp
+        feedback.header.stamp = header(stamp).stamp
         feedback.desired, feedback.actual, feedback.error = points
         return feedback
 
