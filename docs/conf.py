@@ -1,7 +1,6 @@
 """Settings of Sphinx: the documentation site, built from these pages and the docstrings without a network.
 
-Every page reads the same in the repository: links point to files.  Pages that are elsewhere in the repository have a
-page here with one link, which the site replaces by their text.
+Links point to files, as in the repository.  Pages of `OUTSIDE` are empty files here until their text is read.
 """
 
 import builtins
@@ -27,11 +26,14 @@ sys.path[:0] = [str(HERE), str(ROOT)]
 from notebook import NotebookParser  # noqa: E402
 
 OUTSIDE = {
-    "contributing": "CONTRIBUTING.md",
-    "changelog": "CHANGELOG.md",
-    "samples": "bags/README.md",
-    "speed": "benchmarks/README.md",
+    "project/samples": "bags/README.md",
+    "project/speed": "benchmarks/README.md",
+    "project/contributing": "CONTRIBUTING.md",
+    "project/changelog": "CHANGELOG.md",
 }
+(HERE / "project").mkdir(exist_ok=True)
+for page in OUTSIDE:
+    (HERE / f"{page}.md").touch()
 PACKAGES = sorted(path.parent.name for path in ROOT.glob("wam_*/__init__.py"))
 LINK = re.compile(r"\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)]*)?\)")
 
@@ -74,10 +76,9 @@ numpydoc.docscrape_sphinx.SandboxedEnvironment = partial(SandboxedEnvironment, b
 
 def text_of(app: Sphinx, docname: str, source: list[str]) -> None:
     """The text of a page that is elsewhere, and links as the site needs them."""
-    outside = OUTSIDE.get(docname)
-    page = ROOT / outside if outside else HERE / f"{docname}.md"
+    page = ROOT / OUTSIDE.get(docname, f"docs/{docname}.md")
     if page.is_file():
-        text = page.read_text(encoding="utf-8") if outside else source[0]
+        text = page.read_text(encoding="utf-8") if docname in OUTSIDE else source[0]
         source[0] = LINK.sub(lambda found: f"]({target(page.parent, found['path'])}{found['anchor'] or ''})", text)
 
 
@@ -89,7 +90,7 @@ def target(folder: Path, path: str) -> str:
         if named == outside or (ROOT / outside).parent == file:
             return f"/{docname}.md"
     if file.is_dir():
-        return "/samples.md"
+        return "/project/samples.md"
     return f"/{file.relative_to(HERE).as_posix()}" if file.is_relative_to(HERE) else f"/{Path('..') / named}"
 
 
