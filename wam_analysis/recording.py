@@ -111,6 +111,7 @@ class AnalysedRecording:
 
         A command is of the states whose topics share most parts with its own: of two robots, as /left/joint_states and
         /right/joint_states, neither has that of the other.  What a controller reports with its command does not count.
+        Once another one has taken over, it is not known any more.
         """
         own = [
             one for one in self.commands if one.name == source.name and (source.is_joint or source.shares_frame(one))
@@ -119,7 +120,9 @@ class AnalysedRecording:
             others = (two for two in self.states if two.name == source.name and f"{two.topic} {COMMAND}" != one.topic)
             if shared_parts(one, source) < max((shared_parts(one, two) for two in others), default=0):
                 own.remove(one)
-        return max(own, key=lambda one: shared_parts(one, source), default=None)
+        best = max(own, key=lambda one: shared_parts(one, source), default=None)
+        later = [] if best is None else [one.time for one in own if one.time[0] > best.time[-1]]
+        return best and best._replace(away=np.sort(np.concatenate([best.away, *later])))
 
     # the run
 

@@ -164,7 +164,8 @@ def twice() -> list[Case]:
 def by_chance() -> list[Case]:
     """Delays that change the order of messages, and values that are no numbers, which are no lost messages."""
     drawn, sent = np.random.default_rng(5), one("/joint_states", 100.0, 0.7, 0.5)
-    late = [s._replace(received=s.received + by) for s, by in zip(sent, 0.03 * drawn.random(len(sent)), strict=True)]
+    late, mixed = ([s._replace(received=s.received + most * by) for s, by in zip(sent, drawn.random(3000), strict=True)]
+                   for most in (0.03, 0.7))  # fmt: skip
     none = {"position": [math.nan, 0.2], "velocity": [math.nan, 0.0], "effort": [math.nan, 0.0], "name": ["a", "b"]}
     both = [{q: [*v, *none[q][1:]] for q, v in s.fields.items()} for s in sent]
     lacking = drawn.random(len(sent)) < 0.1
@@ -177,6 +178,7 @@ def by_chance() -> list[Case]:
     told = f"in only {len(sent) - np.count_nonzero(lacking)} of {len(sent)}"
     return [
         Case("late", by_rosbags, late, expected),
+        Case("in no order", by_rosbags, mixed, expected),
         Case("played in a loop, some late", sqlite, played, expected | gap, "reception times are used"),
         Case("all at once after a pause", sqlite, sent + after, FRICTION, "messages missing"),
         Case("no numbers", sqlite, some, expected, told),
@@ -272,6 +274,7 @@ def few_cycles() -> list[Case]:
         Case("in each half", by_rosbags, without(one("/js", 100.0, 0.3, 0.5, lambda q: np.interp(
             np.arange(3000) * 9 // 10 / 0.9, np.arange(3000), q)), lambda _: True, "velocity", "effort"), {}, "",
             NOTHING, ("a repeats at 0.3 Hz, 1 rad peak to peak. /js: 3000 messages",)),
+        Case("few samples", ros1, in_steps(17.1, 0.005, 1e-6), sine(17.1, 0.005)),
         Case("with some lost", ros1, lost, {"a, 11 Hz: amplitude": 0.001}, "messages missing"),
         *(Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
                ("No vibration was found above", f"recording: {seconds:g} s"))
@@ -300,10 +303,8 @@ def still() -> list[Case]:
     return [
         Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
              {"a: frequency": 0.3}, "", NOTHING, ("a: moved by 0.00614 rad, more slowly than 0.0939 rad/s, or",)),
-        with_flicker(by_rosbags, 1, 1e-4, 0.0),
-        with_flicker(sqlite, 2, 1e-3, 1e-4),
-        with_flicker(ros1, 3, 2e-5, 1e-3),
-        with_flicker(sqlite, 4, 1.9e-3, 0.0, 0.003),
+        *(with_flicker(*each) for each in ((by_rosbags, 1, 1e-4, 0.0), (sqlite, 2, 1e-3, 1e-4), (ros1, 3, 2e-5, 1e-3),
+                                           (sqlite, 4, 1.9e-3, 0.0, 0.003))),
         Case("a belt", ros1, joints("/s", np.arange(600) / 50.0, ["a"], position=0.02 * np.arange(600)[:, None]),
              {}, "", NOTHING, ("a: always in motion",)),
         Case("noise", by_rosbags,
@@ -400,15 +401,14 @@ def contradictions() -> list[Case]:
     both.append(Case("one that buzzes", by_rosbags, quiet, sine(0.7, 0.5) | FRICTION))
     both += [Case(f"{rate:g} Hz", sqlite, one("/joint_states", rate, 0.01 * rate, 0.5, None, 600.0 / rate),
                   {"/joint_states: period": 1e3 / rate}) for rate in (1.0, 0.2)]  # fmt: skip
-    others = [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), scaled(0.85, sqlite, 200.0), *both]
-    scales = [
-        *others,
-        scaled(57.3, by_rosbags, 100.0),
-        *(scaled(0.0, write, rate) for write, rate in ((by_rosbags, 100.0), (sqlite, 250.0), (ros1, 125.0))),
-        scaled(-1.0, sqlite, 200.0),
-        *(scaled(by, ros1, 50.0) for by in (0.105, 1.05)),
-    ]
-    return [*scales, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0),
+    scales = ((0.85, sqlite, 200.0), (57.3, by_rosbags, 100.0), (0.0, by_rosbags, 100.0), (0.0, sqlite, 250.0),
+              (0.0, ros1, 125.0), (-1.0, sqlite, 200.0), (0.105, ros1, 50.0), (1.05, ros1, 50.0))  # fmt: skip
+    counts = 0.0015 * np.rint(np.clip(np.arange(3000) - [[900], [1900]], 0, 60) / 30.0).sum(0)[:, None]
+    pulses = joints("/js", np.arange(3000) / 100.0, ["a"], position=counts, velocity=100.0 * np.diff(
+        counts, axis=0, prepend=0.0))  # fmt: skip
+    both += [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), Case("pulses of an encoder", sqlite, pulses, {})]
+    both += [scaled(*each) for each in scales]
+    return [*both, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0),
             Case("slips now and then", by_rosbags, one("/js", 100.0, 0.3, 0.7, lambda q: q - 0.15 * np.clip(
                 np.arange(len(q)) / 20.0 - [[31], [66], [109]], 0.0, 1.0).sum(0)), {}, "an encoder slips")]  # fmt: skip
 

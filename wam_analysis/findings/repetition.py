@@ -96,7 +96,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     least = shown(min(begins), "Hz")
     span = f"To find vibrations below {least}, record longer without a gap."
     silent = f"No vibration was found above {least} that lasts throughout."
-    return Section("frequency", "Spectrum", (silent, span)[bool(findings) :], findings)
+    return Section("frequency", "Spectrum", (span if findings else silent,), findings)
 
 
 def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:

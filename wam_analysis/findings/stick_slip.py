@@ -42,7 +42,7 @@ def stick_section(recording: AnalysedRecording) -> Section:
             sentence += f" (from {', '.join(begins)} s)"
             if found.slowest:
                 sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
-        if found.commanded > SHAFT.disobeyed and len(found.begins) > 2 and 100.0 * found.stuck > SHAFT.turning:
+        if found.commanded > SHAFT.disobeyed and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
             verdict.append(f"{one.label}: {sentence}.")
         alike[sentence].append(one.label)

@@ -126,7 +126,7 @@ def rising(stamps: Times, received: Times) -> Times:
     """
     if len(stamps) < 2:
         return stamps
-    period = np.median(np.diff(stamps))
+    period = np.median(np.abs(np.diff(stamps)))  # longer where they are out of order, as of several threads
     keeps_pace = abs(np.median(np.diff(received)) - period) <= STREAM.pace * period
     age = received - stamps
     before, here, after = stamps[:-2], stamps[1:-1], stamps[2:]

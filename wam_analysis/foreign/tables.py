@@ -116,7 +116,8 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
             units[quantity] = found[quantity][0][:2]
     clock = next((one for one in found["stamp"] if not one.name), None)
     if clock is None:
-        raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
+        columns = ", ".join(map(str, series))
+        raise BagError(f"{path} has no column '{title}'; name that of the time with --map stamp=COLUMN: {columns}")
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
     _require_one_run(path, times, series)
@@ -230,9 +231,8 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
     wanted, _ = _split(given.fields.get(quantity, "time" if quantity == "stamp" else quantity))
     parts = wanted.split(",")
     if quantity == "stamp" and len(parts) == 2 and all(part in series for part in parts):
-        return [
-            _Column(*UNITS["ns"], True, "", False, wanted, joined_times(*(_numbers(series[part]) for part in parts)))
-        ]
+        numbers = (_Column(1.0, "s", False, "", False, part, series[part]).numbers for part in parts)
+        return [_Column(*UNITS["ns"], True, "", False, wanted, joined_times(*numbers))]
     found = []
     for title in series:
         whole, unit = _split(str(title))

@@ -149,18 +149,22 @@ def without_turns(
 
 
 def noise(value: Numbers) -> float:
-    """Standard deviation of the noise of a signal, from its second and higher differences.
+    """Standard deviation of the noise of a signal, from its second and higher differences, or its spectrum.
 
     Robust against jumps, since it is a median of absolute differences; smooth motion adds nothing. With few samples in
-    a period, as of a vibration, the second differences are of the motion.
+    a period, as of a vibration, these are of the motion, but most of the spectrum is not.
 
     Parameters
     ----------
     value : (n,), at a constant rate.
     """
-    orders = (2, 4, 6, 8)[: max(len(value) - 1, 0) // 2]
-    sizes = (float(np.median(np.abs(np.diff(value, m)))) / math.sqrt(math.comb(2 * m, m)) for m in orders)
-    return min(sizes, default=0.0) / 0.6745
+    n = len(value)
+    if n < 3:
+        return 0.0
+    sizes = [np.median(np.abs(np.diff(value, m))) / math.sqrt(math.comb(2 * m, m)) for m in (2, 4, 6, 8) if m < n]
+    spectrum = np.abs(np.fft.rfft(np.hanning(n) * (value - np.mean(value))))
+    # of white noise, the median of the power is log(2) of its mean
+    return float(min(min(sizes) / 0.6745, np.median(spectrum) / math.sqrt(0.375 * n * math.log(2.0))))
 
 
 def smoothed(value: Numbers, width: int) -> Numbers:
