@@ -563,7 +563,8 @@ int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex, co
   struct timespec later = *until;
   int is_of_wall_clock = until->tv_sec > 1000000000;
   if (is_of_wall_clock && access(getenv("SET_BACK"), F_OK) == 0 && !waits++) later.tv_sec += 3600;
-  return ((Wait *)dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2"))(condition, mutex, &later);
+  Wait *wait = (Wait *)dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2");  // of this name on x86-64 alone
+  return (wait ? wait : (Wait *)dlsym(RTLD_NEXT, "pthread_cond_timedwait"))(condition, mutex, &later);
 }
 """
 TIMER = """
