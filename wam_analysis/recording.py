@@ -121,8 +121,8 @@ class AnalysedRecording:
             if shared_parts(one, source) < max((shared_parts(one, two) for two in others), default=0):
                 own.remove(one)
         best = max(own, key=lambda one: shared_parts(one, source), default=None)
-        later = [] if best is None else [one.time for one in own if one.time[0] > best.time[-1]]
-        return best and best._replace(away=np.sort(np.concatenate([best.away, *later])))
+        later = [one.time[0] for one in own if one.time[0] > best.time[-1]] if best else []
+        return best and best._replace(away=np.sort([*best.away, *later]))
 
     # the run
 

@@ -371,7 +371,7 @@ def _treated(one: Source) -> Source:
         # a zero that would move and move back is a single sample, too
         least = SHAFT.joint_rest * (quantity == "position")
         rows = row_at(one.time, back) if least and len(back) else _spikes(value, least)
-        if quantity == "velocity" and "position" in values:  # what its position does, too, is a short motion
+        if len(rows) and quantity == "velocity" and "position" in values:  # what its position does, too, is motion
             steps = np.abs(np.diff(values["position"]) / np.diff(one.time))
             rows = rows[~(2.0 * np.maximum(steps[rows - 1], steps[rows]) > np.abs(value[rows]))]
         if len(rows):
