@@ -148,8 +148,8 @@ SENTENCES: Final = {  # by cause
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one",
-    "stopped": "{nodes} has stopped or is very slow: no new {topics}; if it has stopped, start it, or 'wam up', again; "
-    "if the computer is busy, end other programs",
+    "stopped": "{nodes} has stopped or is very slow: no new {topics}{together}; if it has stopped, start it, or "
+    "'wam up', again; if the computer is busy, end other programs",
     "long_step": "no new {topics}, because {step}; make the steps of that node faster",
     "ended": "{node} has ended; start it again, or 'wam up' if that started it",
     **{f"bus_{cause}": f"bus: {text}" for cause, text in BUS.items()},
@@ -230,6 +230,7 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
         "lamps": f" (the pendant shows a fault of the {detail}{FAST * ('velocity' in detail)})" if detail else "",
         "hidden": ", friction of motors at rest hides a part of it" * (source == "motors"),
         "dither": ", use the dither (timing.dither_cycle=40)" * (source == "motors"),
+        "together": f" (or {others} have stopped)" if (others := values.get("others")) else "",
         "model": LOADED * (values.get("part") == "payload") + "run 'wam identify'",
     }
     if values.get("part") in PARTS:

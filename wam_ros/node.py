@@ -200,8 +200,8 @@ class AdaptedNode(StackNode):
             health.set_problem("inputs", None)
         elif self._is_enabled and "inputs" not in health.problems:
             lost, stopped, others = self.interface.silent(ages)  # a node may just have been late, on a busy machine
-            topics, together = " and ".join(lost), f" (or {' and '.join(others)} have stopped)" if others else ""
-            problem = fault("stopped", nodes=", ".join(stopped), topics=topics + together)
+            topics = " and ".join(lost)
+            problem = fault("stopped", nodes=", ".join(stopped), others=" and ".join(others), topics=topics)
             pause, ended = self._pause
             if step := self.peers.held_up({*stopped, self.get_name()}):
                 problem = fault("long_step", step=step, topics=topics)
