@@ -101,9 +101,11 @@ def require_parameters(configuration: Configuration) -> None:
             try:
                 configuration.node(one.name, one.parameter_class)
             except ParameterError as error:
-                shares = f"node '{entry}' has the name and so the parameters of the packaged node '{one.name}'"
-                is_own = one.name in NODES and not one.node.__module__.startswith("wam_")
-                refusals.append(f"{shares}: give it another name; {error}" if is_own else str(error))
+                refusal = str(error)
+                if one.name in NODES and not one.node.__module__.startswith("wam_"):
+                    shares = f"node '{entry}' has the name and so the parameters of the packaged node '{one.name}'"
+                    refusal = f"{shares}: give it another name; {refusal}"
+                refusals.append(refusal)
     require(not refusals, "; also: ".join(refusals))
 
 
@@ -292,12 +294,15 @@ class Interface:
     def silent(self, ages: Mapping[str, float]) -> tuple[list[str], list[str], list[str]]:
         """Which topics are lost, and which nodes must have ended for it while the other topics still come.
 
-        A node that still answers in one of the topics that come cannot be it; one that all lost topics have in
-        common explains them best.  The others, which would explain them together, come last.
-
         Parameters
         ----------
         ages : of the newest message by topic, as parts of their limits.
+
+        Returns
+        -------
+        tuple
+            the topics; the nodes that explain them best: those that all lost topics have in common; other nodes that
+            explain them if all of these have ended.  A node that still answers in a topic that comes is in neither.
         """
         oldest = max(ages.values())
         lost = [topic for topic, age in ages.items() if age > INPUTS.together * oldest]
