@@ -26,8 +26,8 @@ class Lockstep:
 
     Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node.  Shortly before,
     a new session is announced.  A node that does not report that it follows has stopped; of those that do, the one
-    that lacks nothing for its step has not answered.  After the fault the arm is braked and advances by one period
-    every `watch`, so that a node that was restarted gets states; with the next answer lockstep goes on.
+    that lacks nothing for its step has not answered.  After the fault the arm is braked.  It advances by one period
+    every `watch`, so that a node that was restarted gets states.  With the next answer lockstep goes on.
 
     Parameters
     ----------
