@@ -38,6 +38,9 @@ class MessageBus:
 class QueuedBus(MessageBus):
     """Hands messages on in the order in which they were published, some of them in each turn of an executor.
 
+    What is published in answer to a message of the middleware has its turn right after it.  A turn of the executor
+    comes only after all that has arrived before: on a busy computer, many seconds later.
+
     Parameters
     ----------
     later : lets the executor call a function in its turn.
@@ -52,6 +55,7 @@ class QueuedBus(MessageBus):
     def __init__(self, later: Callable[[Callable[[], None]], object], most: int) -> None:
         super().__init__()
         self._later, self._most = later, most
+        self._is_due = False  # whether there will be a turn
         self.unserved: Counter[str] = Counter()
         self.tapes: list[Callable[[str, bytes], object]] = []
         self._next: deque[tuple[list[Take], deque[tuple[Any, Any]]]] = deque()  # whose message is next
@@ -70,22 +74,45 @@ class QueuedBus(MessageBus):
         def publish(stamp: Any, value: Any) -> None:
             if not takers:
                 return
-            if not following:
-                self._later(self._turn)
             if len(waiting) < depth:
                 following.append((takers, waiting))
             waiting.append((stamp, value))
+            if not self._is_due:
+                self._request()
 
         return publish
 
+    def answered(self, receive: Callable[[Any], object]) -> Callable[[Any], None]:
+        """A function that takes a message of the middleware, and then hands on what was published in answer."""
+
+        def take(data: Any) -> None:
+            is_due, self._is_due = self._is_due, True
+            try:
+                receive(data)
+                self._hand_on()
+            finally:
+                self._is_due = is_due
+                self._request()
+
+        return take
+
+    def _request(self) -> None:
+        """Request a turn of the executor, where something waits for one."""
+        if self._next and not self._is_due:
+            self._is_due = True
+            self._later(self._turn)
+
     def _turn(self) -> None:
+        self._hand_on()
+        self._is_due = False
+        self._request()
+
+    def _hand_on(self) -> None:
         following = self._next
         for _ in range(self._most):
-            takers, waiting = following[0]
+            if not following:
+                return
+            takers, waiting = following.popleft()
             stamp, value = waiting.popleft()
             for take in takers:
                 take(stamp, value)
-            following.popleft()  # only now, so that what they publish does not ask for a turn of its own
-            if not following:
-                return
-        self._later(self._turn)

@@ -155,6 +155,8 @@ class Inlets:
         if is_local:
             bus.listen(node.resolve_topic_name(name), node.bearing(take, f"a message on {topic}"))
             profile.depth = 1
+        elif bus:
+            receive = bus.answered(receive)
         subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
         if is_local:
             self.leave_unserved(subscription)

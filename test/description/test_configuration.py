@@ -154,13 +154,6 @@ def test_unknown_packaged_configuration_is_refused_with_those_that_exist() -> No
         packaged("wum")
 
 
-def test_a_file_that_would_win_over_the_command_line_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "mine.yaml"
-    path.write_text(packaged("wam").read_text() + LOOP)
-    with pytest.raises(ParameterError, match=r"section '/\*\*/loop' comes after '/\*\*'"):
-        Configuration.load(path)
-
-
 def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
     overlay = tmp_path / "mine.yaml"
     overlay.write_text(
@@ -183,36 +176,27 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
     [
         ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
         ("base: odd.yaml\n", "base is the file itself"),
-        (
-            "base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n",
-            r"section '/\*\*/drivr' belongs to no node in 'nodes'",
+        ("base: wam\n/**/drivr: {ros__parameters: {a: 2}}\n", r"section '/\*\*/drivr' belongs to no node in 'nodes'"),
+        (  # beside a node of one's own
+            (
+                "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n/**: {ros__parameters: {nodes: "
+                "[driver, transform, 'wam_control.velocity.gravity_node:GravityNode']}}\n"
+            ),
+            r"section '/\*\*/force_lop' belongs to no node.*did you mean 'force_loop'",
         ),
+        (packaged("wam").read_text() + LOOP, r"section '/\*\*/loop' comes after '/\*\*'"),  # it would win over -p
         ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
         ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
     ],
 )
-def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: str, message: str) -> None:
+def test_sections_that_do_not_fit_are_refused(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "odd.yaml"
     path.write_text(text)
     with pytest.raises(ParameterError, match=message):
-        Configuration.load(path)
+        Simulation(Configuration.load(path), [])
 
 
-def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "mine.yaml"
-    path.write_text(
-        "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n"
-        "/**: {ros__parameters: {nodes: [driver, transform, 'wam_control.velocity.gravity_node:GravityNode']}}\n"
-    )
-    found = Configuration.load(path)
-    with pytest.raises(
-        ParameterError, match=r"section '/\*\*/force_lop' belongs to no node.*did you mean 'force_loop'"
-    ):
-        Simulation(found, [])
-
-
-def test_a_section_may_be_empty(tmp_path: Path) -> None:
-    """That of a node without parameters is."""
+def test_the_section_of_a_node_without_parameters_is_empty(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("base: wam\n/**/gravity: {ros__parameters: {}}\n/**: {ros__parameters: {}}\n")
     assert Configuration.load(path).sections == WAM.sections

@@ -3,6 +3,8 @@
 from collections import deque
 from collections.abc import Callable
 
+import pytest
+
 from wam_description.message_bus import MessageBus, QueuedBus
 
 
@@ -44,3 +46,21 @@ def test_of_more_messages_than_its_depth_a_topic_keeps_the_newest() -> None:
     list(map(bus.publisher("/a", 2), range(5), "abcde"))
     tasks.popleft()()
     assert (seen, len(tasks)) == ([3, 4], 0)
+
+
+def test_answers_to_a_message_of_the_middleware_come_before_what_the_executor_was_given_since() -> None:
+    tasks, seen = deque[Callable[[], None]](), list[int]()
+    bus = QueuedBus(tasks.append, 2)
+    publish = bus.publisher("/a", 5)
+    bus.listen("/a", lambda stamp, value: seen.append(stamp))
+    take = bus.answered(lambda data: [publish(number, 1 // number) for number in data])
+    take(b"\1\2")
+    assert (seen, len(tasks)) == ([1, 2], 0), "no turn is asked for"
+    take(b"\3\4\5")
+    assert (seen, len(tasks)) == ([1, 2, 3, 4], 1), "a long answer lets others have their turns"
+    with pytest.raises(ZeroDivisionError):
+        take(b"\0")
+    take(b"\6")
+    assert (seen, len(tasks)) == ([1, 2, 3, 4, 5, 6], 1)
+    tasks.popleft()()
+    assert not tasks, "the turn that was asked for finds nothing"
