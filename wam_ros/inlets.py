@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.subscription import Subscription
 
 from wam_description.event import Event, fault
@@ -61,6 +62,17 @@ class PublisherClaim:
             return None
         who = " and ".join(names) if len(names) > 1 else f"{count} nodes named {names[0]}"
         return fault("claimed", nodes=who, topic=self._topic)
+
+    def unheard(self) -> str:
+        """Which node publishes with a quality of service by which nothing comes, and why; '' where none does."""
+        name = self._subscription.topic_name
+        if self._node.count_publishers(name) > self.count:  # also for a moment, of a new one
+            for info in self._node.get_publishers_info_by_topic(name):
+                verdict, reason = qos_check_compatible(info.qos_profile, self._subscription.qos_profile)
+                if verdict == QoSCompatibility.ERROR:
+                    why = reason.removeprefix("ERROR: ").strip("; ")
+                    return f"nothing of {info.node_name} comes: {why}; publish it with the QoS of docs/topics.md"
+        return ""
 
     def _names(self, count: int) -> list[str]:
         """Full names of the nodes that publish the topic, each once."""
@@ -181,8 +193,10 @@ class Inlets:
         return rivals
 
     def _look_at_all(self) -> None:
-        for topic in self.claims:
+        for topic, claim in self.claims.items():
             self._look(topic)
+            if why := claim.unheard():
+                self._node.health.refuse(topic, why)
 
     def restart(self) -> None:
         """Forget what came out of order: another session of the driver has begun."""

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy, qos_profile_sensor_data
 from ros_network import Network
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
@@ -204,6 +204,14 @@ def test_two_publishers_of_the_command_are_a_fault_and_the_second_never_reaches_
     live.ros.wait(lambda: not live.node.health.problem)
     live.wait_periods(5)
     live.enable()
+
+
+def test_a_publisher_of_which_nothing_can_come_shows_in_the_status(live: Hand) -> None:
+    heard, other = Listener(live.ros, "status"), live.ros.node("other")
+    second = other.create_publisher(JointState, "motor_current_command", qos_profile_sensor_data)
+    live.ros.wait(lambda: [m for m in heard.seen["status"] if "nothing of other comes: " in m.message])
+    other.destroy_publisher(second)
+    live.ros.wait(lambda: "nothing of" not in heard.seen["status"][-1].message)
 
 
 def last_flow_after(hand: Hand, stamp: int) -> int:
