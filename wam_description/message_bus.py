@@ -56,6 +56,7 @@ class QueuedBus(MessageBus):
         super().__init__()
         self._later, self._most = later, most
         self._is_due = False  # whether there will be a turn
+        self._published = 0
         self.unserved: Counter[str] = Counter()
         self.tapes: list[Callable[[str, bytes], object]] = []
         self._next: deque[tuple[list[Take], deque[tuple[Any, Any]]]] = deque()  # whose message is next
@@ -77,19 +78,24 @@ class QueuedBus(MessageBus):
             if len(waiting) < depth:
                 following.append((takers, waiting))
             waiting.append((stamp, value))
+            self._published += 1
             if not self._is_due:
                 self._request()
 
         return publish
 
     def answered(self, receive: Callable[[Any], object]) -> Callable[[Any], None]:
-        """A function that takes a message of the middleware, and then hands on what was published in answer."""
+        """A function that takes a message of the middleware, and then hands on what was published in answer.
+
+        One without an answer gives no turn: else nodes that answer each other would leave less time to all others.
+        """
 
         def take(data: Any) -> None:
-            is_due, self._is_due = self._is_due, True
+            is_due, self._is_due, before = self._is_due, True, self._published
             try:
                 receive(data)
-                self._hand_on()
+                if self._published > before:
+                    self._hand_on()
             finally:
                 self._is_due = is_due
                 self._request()

@@ -60,6 +60,8 @@ def test_answers_to_a_message_of_the_middleware_come_before_what_the_executor_wa
     assert (seen, len(tasks)) == ([1, 2, 3, 4], 1), "a long answer lets others have their turns"
     with pytest.raises(ZeroDivisionError):
         take(b"\0")
+    take(b"")
+    assert len(seen) == 4, "without an answer there is no turn"
     take(b"\6")
     assert (seen, len(tasks)) == ([1, 2, 3, 4, 5, 6], 1)
     tasks.popleft()()
