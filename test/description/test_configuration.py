@@ -177,13 +177,6 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
         ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
         ("base: odd.yaml\n", "base is the file itself"),
         ("base: wam\n/**/drivr: {ros__parameters: {a: 2}}\n", r"section '/\*\*/drivr' belongs to no node in 'nodes'"),
-        (  # beside a node of one's own
-            (
-                "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n/**: {ros__parameters: {nodes: "
-                "[driver, transform, 'wam_control.velocity.gravity_node:GravityNode']}}\n"
-            ),
-            r"section '/\*\*/force_lop' belongs to no node.*did you mean 'force_loop'",
-        ),
         (packaged("wam").read_text() + LOOP, r"section '/\*\*/loop' comes after '/\*\*'"),  # it would win over -p
         ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
         ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
@@ -193,7 +186,18 @@ def test_sections_that_do_not_fit_are_refused(tmp_path: Path, text: str, message
     path = tmp_path / "odd.yaml"
     path.write_text(text)
     with pytest.raises(ParameterError, match=message):
-        Simulation(Configuration.load(path), [])
+        Configuration.load(path)
+
+
+def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path) -> None:
+    path, message = tmp_path / "mine.yaml", r"section '/\*\*/force_lop' belongs to no node.*did you mean 'force_loop'"
+    path.write_text(
+        "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n"
+        "/**: {ros__parameters: {nodes: [driver, transform, 'wam_control.velocity.gravity_node:GravityNode']}}\n"
+    )
+    found = Configuration.load(path)
+    with pytest.raises(ParameterError, match=message):
+        Simulation(found, [])
 
 
 def test_the_section_of_a_node_without_parameters_is_empty(tmp_path: Path) -> None:

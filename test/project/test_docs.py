@@ -1,15 +1,12 @@
-"""What the documentation says is what the code does: pages are current, names exist.
-
-The commands are run by test_doc_commands.py, the site is built by test_site.py.
-"""
+"""The documentation agrees with the code; test_doc_commands.py runs its commands, test_site.py builds its site."""
 
 import ast
 import difflib
-import importlib.util
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -28,18 +25,9 @@ HANDBOOK = {
 ACTIONS = {"/wam/follow_joint_trajectory"}  # of `wam live --trajectories`, where control_msgs is installed
 
 
-def load(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="module")
 def generate() -> Any:
-    return load(ROOT / "docs" / "generate.py")
+    return SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "generate.py")))
 
 
 @pytest.mark.slow
@@ -48,6 +36,13 @@ def test_generated_pages_are_current(generate: Any) -> None:
     stale = [f"docs/{path.name}" for path, text in pages.items() if path.read_text(encoding="utf-8") != text]
     assert stale == [], "these pages are not what the code says; run docs/generate.py --pages with them, and commit"
     assert {path.name for path in pages} >= {"running.md", "topics.md", "parameters.md", "thesis.md"}
+
+
+def test_a_changed_block_is_noticed_and_a_changed_sentence_is_kept(generate: Any) -> None:
+    text = HANDBOOK["topics.md"]
+    assert generate.filled(text.replace("| `motor_states`", "| `motor_status`")) == text, "make docs ARGS=--pages"
+    own = text.replace("# Topics\n", "# Our topics\n")
+    assert generate.filled(own) == own
 
 
 def test_topics_and_services_named_in_the_handbook_exist(arm: RunningArm) -> None:
