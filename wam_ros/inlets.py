@@ -6,6 +6,7 @@ from typing import Any
 
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from wam_description.event import Event, fault
 from wam_description.event_text import sentence
@@ -17,6 +18,12 @@ from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import decoder, requirement, stamp_in
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
+UNNAMED = "a node whose name is not known yet"
+
+
+def full_name(info: TopicEndpointInfo) -> str:
+    """Of the node of a publisher."""
+    return UNNAMED if info.node_name == UNKNOWN else f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
 class PublisherClaim:
@@ -71,7 +78,7 @@ class PublisherClaim:
                 verdict, reason = qos_check_compatible(info.qos_profile, self._subscription.qos_profile)
                 if verdict == QoSCompatibility.ERROR:
                     why = reason.removeprefix("ERROR: ").strip("; ")
-                    return f"nothing of {info.node_name} comes: {why}; publish it with the QoS of docs/topics.md"
+                    return f"nothing of {full_name(info)} comes: {why}; publish it with the QoS of docs/topics.md"
         return ""
 
     def _names(self, count: int) -> list[str]:
@@ -79,10 +86,10 @@ class PublisherClaim:
         if self._named[0] == count:
             return self._named[1]
         found = self._node.get_publishers_info_by_topic(self._subscription.topic_name)
-        names = sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found}) or [UNKNOWN]
-        if len(found) == count and not any(UNKNOWN in name for name in names):
+        names = sorted(set(map(full_name, found))) or [UNNAMED]
+        if len(found) == count and UNNAMED not in names:
             self._named = count, names
-        return [name if UNKNOWN not in name else "a node whose name is not known yet" for name in names]
+        return names
 
 
 class Inlets:

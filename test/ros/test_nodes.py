@@ -209,7 +209,7 @@ def test_two_publishers_of_the_command_are_a_fault_and_the_second_never_reaches_
 def test_a_publisher_of_which_nothing_can_come_shows_in_the_status(live: Hand) -> None:
     heard, other = Listener(live.ros, "status"), live.ros.node("other")
     second = other.create_publisher(JointState, "motor_current_command", qos_profile_sensor_data)
-    live.ros.wait(lambda: [m for m in heard.seen["status"] if "nothing of other comes: " in m.message])
+    live.ros.wait(lambda: [m for m in heard.seen["status"] if "nothing of /wam/other comes: " in m.message])
     other.destroy_publisher(second)
     live.ros.wait(lambda: "nothing of" not in heard.seen["status"][-1].message)
 
