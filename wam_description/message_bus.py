@@ -56,7 +56,7 @@ class QueuedBus(MessageBus):
         super().__init__()
         self._later, self._most = later, most
         self._is_due = False  # whether there will be a turn
-        self._published = 0
+        self._published = 0  # messages
         self.unserved: Counter[str] = Counter()
         self.tapes: list[Callable[[str, bytes], object]] = []
         self._next: deque[tuple[list[Take], deque[tuple[Any, Any]]]] = deque()  # whose message is next

@@ -1,8 +1,8 @@
 """Several instants of one contact that explain it together.
 
-While a contact lasts, part of the errors of its torques changes from instant to instant: cogging, noise, friction of a
-motor that has moved on.  Part stays: a wrong friction level, a shaft at rest.  The torques of some instants are taken
-as one measurement, of 4 numbers per instant of an arm of 4 joints.  Its covariance has both parts:
+While a contact lasts, a part of the errors of its torques changes: cogging, noise, friction of a motor that has moved
+on.  A part stays: a wrong friction level, a shaft at rest.  The torques of some instants are taken as one measurement,
+of 4 numbers per instant of an arm of 4 joints.  Its covariance has both parts:
 
     C_jk = H_j P H_k^T + L_j L_k^T + delta_jk R_j.
 
@@ -10,15 +10,15 @@ H are the effects of the model's errors, P is their covariance, the same at all 
 at rest or just reversed.  These may stay or change: they count as both, in L and in R.
 
 One contact position explains all instants.  The force on each link grows and shrinks as the torques do, over those of
-the same force in each pose.  How else it may change is in the covariance, too, by the links' probabilities: its
-direction by a fraction of its size, its position by the way that the arm has moved since, and by the speed of a contact
-that slides along its link.  Few slide.  How probable that is follows from the same instants: by how much better a speed
-explains them, whatever the force and the position.  How large all errors of this contact are, over what is stated,
-follows from what the fit leaves unexplained, and from `freedom` degrees of freedom of the statement itself.
+the same force in each pose.  How else it may change is in the covariance, too, by the links' probabilities.  Its
+direction changes by a fraction of its size.  Its position changes by the way that the arm has moved since, and by the
+speed of a contact that slides along its link.  Few slide.  How probable that is follows from the same instants: by how
+much better a speed explains them, whatever the force and the position.  All errors of this contact may be larger than
+stated.  How much follows from what the fit leaves unexplained, and from `freedom` degrees of freedom of the statement.
 
 The inner products of `ContactFit` are all that a fit needs, of any number of rows.  Those of the past instants are
-computed when one joins them.  Those of the present one, Z_n of covariance C_nn, are added, each without what the past
-predicts (Rasmussen & Williams, 2006, A.6): Z_n - C_np C_pp^-1 Z_p, with C_nn - C_np C_pp^-1 C_pn.
+computed when one joins them.  Those of the present one, Z_n of covariance C_nn, are added without what the past
+predicts: Z_n - C_np C_pp^-1 Z_p, with C_nn - C_np C_pp^-1 C_pn (Rasmussen & Williams, 2006, A.6).
 """
 
 import math
