@@ -38,6 +38,7 @@ def force_section(recording: AnalysedRecording) -> Section:
     known = [one for one in held if math.isfinite(one.best.smallest)]
     findings = [finding for one in held for finding in press_findings(one)] + _dynamic_range(known)
     wrong = [f"{what}." for what, _ in reported]
+    wrong += [_press_sentence(one) for one in held if one.hold.is_short and not one.hold.is_refused]
     return Section("force", "Force", sentences, findings, _forces_verdict(held, known), wrong)
 
 
@@ -110,7 +111,7 @@ def _impact(one: HeldForce) -> str:
     if math.isnan(one.touched):
         return ""
     when = f"{shown(abs(one.touched), 's')} {'after' if one.touched > 0.0 else 'before'} it began"
-    return f"the surface was touched {when}, and the force peaked at {shown(one.largest, 'N')}"
+    return f"the surface was touched {when}"
 
 
 def press_findings(one: HeldForce) -> list[Finding]:
@@ -130,6 +131,7 @@ def press_findings(one: HeldForce) -> list[Finding]:
             Finding(f"{name}: error of the {whose} force", "%", error),
             Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
         ]
+    found += [Finding(f"{name}: largest force", "N", one.largest)] * bool(len(one.true) or len(one.measured))
     if response is not None:
         found += response_findings(name, response, "from the touch-down" * (one.touched > 0.0))
     return found
