@@ -122,14 +122,6 @@ def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[Recorde
     return [*refused[:1], *hard[:1], *missed[:1], *late[:1]]
 
 
-def doubts(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[RecordedReaction]:
-    """What was reported at the end of a step whose command counts as met: the force may be another than is measured."""
-    missed = unmet(reactions, step)
-    found = within(reactions, steady_begin(step), step.end)
-    at_end = [one for one in found if one.end >= step.end - BRIEF and not one.holds]
-    return [] if missed else list({one.name: one for one in reversed(at_end)}.values())
-
-
 def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[PlayedStep]) -> list[str]:
     """A sentence for each reason why what a step commands is not met."""
     return [

@@ -1,7 +1,6 @@
 """Sweeps: parameter sets, equal results on every executor, what was finished is kept, a refused set fails alone."""
 
 import csv
-import math
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,9 +11,9 @@ from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_sim.batch import results
-from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points
+from wam_sim.sweep import Axis, drawn, grid, listed
 from wam_studies.thesis import definition
-from wam_studies.thesis.measurement import measure, swept
+from wam_studies.thesis.measurement import MeasuredCase, ScenarioCase, measure, measure_scenario, swept, swept_scenario
 
 GAIN = "force_loop:force_gain"
 STEPS = """
@@ -31,16 +30,20 @@ def script(tmp_path: Path) -> Path:
     return file
 
 
-def runs(script: Path, gains: tuple[float, ...]) -> list[SweepPoint]:
+def runs(script: Path, gains: tuple[float, ...]) -> list[ScenarioCase]:
     configuration = Configuration.load(packaged("testbed"))
-    axes = [Axis(GAIN, gains)]
-    return points(configuration, load(script, configuration.shared), axes, grid(axes))
+    return swept_scenario(configuration, load(script, configuration.shared), grid([Axis(GAIN, gains)]))
+
+
+def number(found: MeasuredCase, name: str) -> float | str:
+    """What was measured of a quantity."""
+    return next(one.measured for one in found.result.rows if one.quantity == name)
 
 
 def test_a_grid_has_every_combination_and_a_list_goes_in_step() -> None:
     axes = [Axis("a", (1, 2)), Axis("b", (3, 4))]
-    assert grid(axes) == [(1, 3), (1, 4), (2, 3), (2, 4)]
-    assert listed(axes) == [(1, 3), (2, 4)]
+    assert grid(axes) == [{"a": a, "b": b} for a in (1, 2) for b in (3, 4)]
+    assert listed(axes) == [{"a": 1, "b": 3}, {"a": 2, "b": 4}]
     with pytest.raises(ValueError, match="a: 2, b: 1"):
         listed([axes[0], Axis("b", (3,))])
 
@@ -49,8 +52,8 @@ def test_random_sets_are_repeatable_and_between_the_ends() -> None:
     axes = [Axis("a", (1e-3, 1.0)), Axis("b", (-1.0, 2.0))]
     found = drawn(axes, 200, 4)
     assert found == drawn(axes, 200, 4) != drawn(axes, 200, 5)
-    assert all(1e-3 <= a <= 1.0 and -1.0 <= b <= 2.0 for a, b in found)
-    assert 60 < sum(a < 10**-1.5 for a, _ in found) < 140, "by the logarithm"
+    assert all(1e-3 <= one["a"] <= 1.0 and -1.0 <= one["b"] <= 2.0 for one in found)
+    assert 60 < sum(one["a"] < 10**-1.5 for one in found) < 140, "by the logarithm"
     with pytest.raises(ValueError, match="needs two numbers"):
         drawn([Axis("a", (1.0, 2.0, 3.0))], 1, 1)
 
@@ -58,34 +61,30 @@ def test_random_sets_are_repeatable_and_between_the_ends() -> None:
 def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> None:
     configuration = Configuration.load(packaged("testbed"))
     with pytest.raises(ParameterError, match="no parameter 'nothing'"):
-        points(configuration, load(script, configuration.shared), [Axis("force_loop:nothing", (1,))], [(1,)])
+        swept_scenario(configuration, load(script, configuration.shared), [{"force_loop:nothing": 1}])
 
 
-def pressed(tmp_path: Path, frame: str, newtons: list[float]) -> SweepResult:
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("frame", "newtons", "seconds", "error"),
+    [
+        ("link", [0.0, -20.0, 0.0], 1.2, -11.8),
+        ("base", [0.0, 0.0, -20.0], 1.2, -11.8),
+        ("link", [0.0, 20.0, 0.0], 1.2, -100.0),  # nothing is touched
+        ("link", [0.0, -20.0, 0.0], 0.4, float("nan")),  # too brief to be steady
+    ],
+)
+def test_the_error_of_a_force_in_any_frame(
+    frame: str, newtons: list[float], seconds: float, error: float, tmp_path: Path
+) -> None:
     file = tmp_path / "force.yaml"
-    file.write_text(STEPS.replace("link", frame).replace("[0.0, -20.0, 0.0]", str(newtons)))
-    return outcome(runs(file, (0.004,))[0])
-
-
-@pytest.mark.slow
-def test_the_error_is_the_same_in_every_frame_and_all_of_the_force_where_nothing_is_touched(tmp_path: Path) -> None:
-    on_link, in_base = pressed(tmp_path, "link", [0.0, -20.0, 0.0]), pressed(tmp_path, "base", [0.0, 0.0, -20.0])
-    assert in_base.force_rms == pytest.approx(on_link.force_rms, rel=0.02) != pytest.approx(20.0)
-    away = pressed(tmp_path, "link", [0.0, 20.0, 0.0])
-    assert away.force_rms == pytest.approx(20.0, abs=0.2)
-    assert not any(one.failure for one in (on_link, in_base, away))
-
-
-@pytest.mark.slow
-def test_a_force_that_is_commanded_too_briefly_is_named(tmp_path: Path) -> None:
-    file, found = tmp_path / "brief.yaml", []
-    for seconds in ("0.4", "1.0"):
-        file.write_text(STEPS.replace("0.4", seconds))
-        found.append(outcome(runs(file, (0.004,))[0]))
-    file.write_text(STEPS.replace("force: {frame", "chirp: {newtons: 2.0, from: 1.0, to: 3.0}, force: {frame"))
-    found.append(outcome(runs(file, (0.004,))[0]))
-    assert [one.unassessed for one in found] == ["20 N in link: commanded for less than 1 s", "", ""]
-    assert not any(one.failure for one in found)
+    text = STEPS.replace("link", frame).replace("[0.0, -20.0, 0.0]", str(newtons))
+    file.write_text(text.replace("0.4", str(seconds)))
+    found = measure_scenario(runs(file, (0.004,))[0])
+    assert number(found, "press: error of the true force") == pytest.approx(error, abs=0.1, nan_ok=True)
+    brief = ("press: 20 N commanded on link for less than 1 s, so it has no steady state.",)
+    assert (found.result.reported == brief) == (seconds < 1.0)
+    assert not found.failure
 
 
 @pytest.mark.slow
@@ -102,14 +101,11 @@ steps:
   - {{name: press, seconds: 2.0, force: {{frame: base, newtons: [0.0, 0.0, -8.0]}}, {push}}}
 """)
         configuration = Configuration.load(packaged("wam")).with_values({"force_loop:limits.doubt": 5.0})
-        (point,) = points(configuration, load(file, configuration.shared), [], [()])
-        found.append(outcome(point))
-    alone, hidden = found
-    assert alone.force_rms < 3.0  # without a known position the force is known to 2 N
-    assert not alone.unassessed
-    assert math.isnan(hidden.force_rms)
-    assert hidden.unassessed == "8 N in base: another link bears more in 100 % of its steady state"
-    assert hidden.force_peak > 14.0
+        (case,) = swept_scenario(configuration, load(file, configuration.shared), [{}])
+        found.append(measure_scenario(case))
+    alone, hidden = (number(one, "press: true force") for one in found)
+    assert alone == pytest.approx(8.0, abs=3.0)  # without a known position the force is known to 2 N
+    assert hidden == pytest.approx(float("nan"), nan_ok=True)
 
 
 @pytest.mark.slow
@@ -132,52 +128,54 @@ steps:
     with table.open() as stream:
         (row,) = csv.DictReader(stream)
     assert row["failure"] == ""
-    lowered, _, why = row["reported"].partition("; press: ")
-    assert lowered.startswith("the guard lowered it; used: force_gain [0.")
-    assert why == "refused"
-    assert float(row["force_worst"]) > 1.0
+    assert row["reported"].startswith("the guard lowered it; used: force_gain [0.")
+    assert "; Failed: force within 10 %" in row["reported"]
+    assert "; press: applied, but perhaps wrong from " in row["reported"]
+    assert float(row["largest error, bias plus ripple [N]"]) > 1.0
     assert "1 set, 0 failed, 1 with a remark (column 'reported')" in capsys.readouterr().out
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("command", "failure"),
+    ("seconds", "command", "report"),
     [
-        ("torque: [0, 0, 0, 50]", "press refused: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
-        ("torque: [0, 0, 0, 2]", "press not reached: torque of joint 4: "),
-        ("force: {frame: outer_link, newtons: [0, -4, 0]}", "press not reached: force along (0, -1, 0): 4 N are"),
+        (0.4, "torque: [0, 0, 0, 50]", "s: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
+        (3.0, "torque: [0, 0, 0, 2]", "Failed: commands carried out (not reached: press)."),
+        (3.0, "force: {frame: outer_link, newtons: [0, -4, 0]}", "s: force along (0, -1, 0): 4 N are commanded, but"),
         (
+            0.4,
             "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
-            "press refused: force along (0, 0, -1) at 0.28 m along outer_link: 70 N is commanded; allowed: up to",
+            "s: force along (0, 0, -1) at 0.28 m along outer_link: 70 N is commanded; allowed: up to",
         ),
-        ("torque: [0, 0, 0, 0]", ""),
+        (0.4, "torque: [0, 0, 0, 0]", "press: not assessed: its force, torque or motion was commanded for at most 2 s"),
     ],
 )
-def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
-    command: str, failure: str, tmp_path: Path
+def test_a_task_that_the_loop_refuses_or_does_not_reach_is_reported_with_its_reason(
+    seconds: float, command: str, report: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "task.yaml"
-    press = f"- {{name: press, seconds: {3.0 if 'reached' in failure else 0.4}, {command}}}"
+    press = f"- {{name: press, seconds: {seconds}, {command}}}"
     file.write_text(f"steps:\n- {{name: release, seconds: 0.1, request: enable}}\n{press}\n")
     configuration = Configuration.load(packaged("wam"))
-    found = outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure
-    assert found.startswith(failure)
-    assert bool(found) == bool(failure)
+    found = measure_scenario(ScenarioCase(configuration, tuple(load(file, configuration.shared))))
+    assert report in "; ".join(found.result.reported)
+    assert not found.failure
 
 
 @pytest.mark.slow
 def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
     given = runs(script, (0.004, 0.02, -1.0))
     with ThreadPoolExecutor(1) as one:
-        found = results(outcome, given, one, tmp_path / "kept.jsonl")
+        found = results(measure_scenario, given, one, tmp_path / "kept.jsonl")
     assert [bool(result.failure) for result in found] == [False, False, True]
     assert found[2].failure
-    assert found[0].force_rms > found[1].force_rms, "a small gain is slower"
+    largest = [number(one, "press: largest force") for one in found[:2]]
+    assert largest[0] < largest[1], "a large gain overshoots"
     again: list[tuple[int, int]] = []
     with ThreadPoolExecutor(1) as one:
-        kept = results(outcome, given, one, tmp_path / "kept.jsonl", lambda done, of: again.append((done, of)))
+        kept = results(measure_scenario, given, one, tmp_path / "kept.jsonl", lambda done, of: again.append((done, of)))
     assert again == [(3, 3)]
-    assert kept[:2] == found[:2]
+    assert repr(kept) == repr(found)  # with numbers that are not known
 
 
 @pytest.mark.slow
@@ -209,7 +207,7 @@ def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path)
     with table.open() as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row[GAIN]) for row in rows] == pytest.approx([0.004, 0.02])
-    assert all(float(row["force_rms"]) > 0.0 for row in rows)
+    assert all(float(row["press: commanded force [N]"]) == 20.0 for row in rows)
     assert plot.stat().st_size > 5000
 
 
@@ -223,22 +221,22 @@ def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Pat
         main([*command, *(f"--vary=force_loop:{one}" for one in guarded), "--vary", "driver:effects.creep=true,false"])
     with table.open() as stream:
         rows = list(csv.DictReader(stream))
-    creeping, rigid = ([row for row in rows if row["driver:effects.creep"] == name] for name in ("True", "False"))
-    assert [row["quantity"] for row in creeping] == [row["quantity"] for row in rigid]
-    predicted = [[float(row["predicted"]) for row in those] for those in (creeping, rigid)]
-    assert predicted[0] == pytest.approx(predicted[1])
-    assert all(row["agrees"] == "True" for row in creeping)
-    assert "out and back: the guard lowered it; used: force_gain [0.00" in creeping[0]["reported"]
-    assert not any(row["agrees"] == "True" for row in rigid)
-    assert all(abs(float(row["measured"])) < 0.01 * float(row["predicted"]) for row in rigid)
+    creeping, rigid = rows
+    assert [row["driver:effects.creep"] for row in rows] == ["True", "False"]
+    quantities = [name for name in creeping if f"{name}, predicted" in creeping]
+    for name in quantities:
+        assert float(creeping[f"{name}, predicted"]) == pytest.approx(float(rigid[f"{name}, predicted"]))
+        assert abs(float(rigid[name])) < 0.01 * float(rigid[f"{name}, predicted"])
+    assert (creeping["deviating"], rigid["deviating"].count(";")) == ("", len(quantities) - 1)
+    assert "out and back: the guard lowered it; used: force_gain [0.00" in creeping["reported"]
     assert plot.stat().st_size > 5000
 
 
 def test_a_refused_set_of_an_experiment_fails_alone_and_an_unknown_parameter_before_anything_runs() -> None:
     experiment = definition.load("creep")
-    (case,) = swept(experiment, [Axis(GAIN, (-1.0,))], [(-1.0,)])
+    (case,) = swept(experiment, [{GAIN: -1.0}])
     found = measure(case)
     assert "force_gain" in found.failure
     assert not found.result.rows
     with pytest.raises(ParameterError, match="no parameter 'nothing'"):
-        swept(experiment, [Axis("force_loop:nothing", (1,))], [(1,)])
+        swept(experiment, [{"force_loop:nothing": 1}])

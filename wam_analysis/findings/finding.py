@@ -45,10 +45,14 @@ class Finding(NamedTuple):
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
     @property
+    def bound(self) -> float:
+        """Three standard errors of the deviation from the prediction; NaN where one of them is not known."""
+        return SHAFT.sigmas * math.hypot(self.error, SHAFT.neglected * self.predicted)
+
+    @property
     def deviates(self) -> bool:
-        """Whether it differs from its prediction by more than three standard errors."""
-        error = math.hypot(self.error, SHAFT.neglected * self.predicted)
-        return bool(abs(self.measured - self.predicted) > SHAFT.sigmas * error)  # not with NaN
+        """Whether it differs from its prediction by more than that."""
+        return bool(abs(self.measured - self.predicted) > self.bound)  # not with NaN
 
 
 class Section(NamedTuple):
@@ -70,6 +74,11 @@ class Section(NamedTuple):
     findings: Sequence[Finding] = ()
     shows: Sequence[str] = ()
     wrong: Sequence[str] = ()
+
+    @property
+    def problems(self) -> list[str]:
+        """What is wrong, with its reason where a sentence that begins alike has one."""
+        return [next((full for full in self.sentences if full.startswith(one[:-1])), one) for one in self.wrong]
 
 
 def deviations(findings: Sequence[Finding]) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from wam_studies.figures.style import draw_panels
 from wam_studies.page import kept_rows, section_of, with_section
 from wam_studies.thesis import evaluation
 from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
-from wam_studies.thesis.measurement import ExperimentCase, ExperimentRecord, measure
+from wam_studies.thesis.measurement import ExperimentCase, MeasuredCase, measure
 from wam_studies.thesis.rows import PAGE_HEAD, Result, summary
 from wam_studies.thesis.samples import FOLDER, INDEX, LIMIT, Entry, check, make, read_index, write_index
 
@@ -76,7 +76,7 @@ def run(given: argparse.Namespace) -> int:
     chosen = list(map(load, names() if given.all else given.experiment))
     cases = [ExperimentCase(one, _directory(given, one, len(chosen) == 1 and not given.all)) for one in chosen]
     if given.evaluate:
-        records = [ExperimentRecord("", evaluation.evaluate(one, Path(bags))) for one, bags in cases]
+        records = [MeasuredCase("", evaluation.evaluate(one, Path(bags))) for one, bags in cases]
     else:
         with processes(min(given.jobs, len(cases))) as executor:
             records = results(measure, cases, executor, report=Progress("experiments", sys.stderr))

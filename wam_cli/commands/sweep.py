@@ -5,14 +5,16 @@ import csv
 import math
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from wam_analysis.drawing import MEASURED, TRUE
+from wam_analysis.drawing import INK, MEASURED, PREDICTED
 from wam_cli.options import (
     BASE_CONFIGURATION,
     PICTURE,
@@ -33,15 +35,16 @@ from wam_description import yaml_text
 from wam_description.configuration import option_values
 from wam_description.thresholds import FILES
 from wam_sim.batch import results
-from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, outcome, points
+from wam_sim.sweep import MOST_SETS, Axis, Values, drawn, grid, listed
 from wam_studies.figures.style import panels
 from wam_studies.thesis import definition
-from wam_studies.thesis.measurement import ExperimentRecord, measure, swept
+from wam_studies.thesis.measurement import MeasuredCase, measure, measure_scenario, swept, swept_scenario
+from wam_studies.thesis.rows import NOTHING, value_text
 
 SCENARIO = "demo_scenario"
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
-Sets = list[tuple[Any, ...]]
-Points = tuple[str, str, str, list[list[float]]]  # label, marker, colour, and the values of each set
+PREDICTED_TOO = ", predicted"  # after the title of a quantity
+Runs = tuple[Callable[[Any], MeasuredCase], Sequence[Any], bool]  # what measures, the cases, and may results be kept
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,7 +90,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--picture",
         type=PICTURE,
-        help="plot into this PNG, PDF or SVG: the force error, or the results of the experiment, over each parameter",
+        help="plot into this PNG, PDF or SVG: the numbers of the whole run over each parameter",
     )
     take_batch(parser, "sweep")
 
@@ -99,8 +102,15 @@ def run(given: argparse.Namespace) -> int:
     _refuse_idle(given, axes)
     seed = 1 if given.seed is None else given.seed
     sets = drawn(axes, given.random, seed) if given.random else listed(axes) if given.list else grid(axes)
-    failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
-    failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
+    function, cases, is_kept = (_of_experiment if given.experiment else _of_scenario)(given, sets)
+    with batch_of(given, len(cases)) as batch:
+        found = results(function, cases, batch.executor, batch.file if is_kept else None, batch.report)
+    rows, titles = _table(sets, found)
+    _write(given.file, rows)
+    if given.picture:  # of a scenario what is of the whole run, and not of one of its steps
+        _draw(given.picture, list(sets[0]), rows, [one for one in titles if given.experiment or ": " not in one])
+    failures = [one.failure for one in found if one.failure]
+    failed, doubted = len(failures), sum(bool(one.result.reported) for one in found)
     doubts = f", {doubted} with a remark (column 'reported')" if doubted else ""
     count, why = f"{len(sets)} set{'s' * (len(sets) != 1)}", " (column 'failure')" * bool(failed)
     print(f"{count}, {failed} failed{why}{doubts}, in {given.file}")
@@ -124,37 +134,21 @@ def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
             )
 
 
-def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
-    """Why each set failed, '' where it did not, and what was reported of the others; a row of the table for each."""
+def _of_scenario(given: argparse.Namespace, sets: list[Values]) -> Runs:
+    """The scenario with each set; that of a node of one's own is not kept, as its code may import any file."""
     configuration = configuration_of(given)
-    runs = points(configuration, load(script_file(given.scenario or SCENARIO), configuration.shared), axes, sets)
-    with batch_of(given, len(runs)) as batch:
-        is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
-        found = results(outcome, runs, batch.executor, None if is_own else batch.file, batch.report)
-    _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
-    if given.picture:
-        _scenario_figure(given.picture, axes, sets, found)
-    return [result.failure for result in found], [result.reported for result in found]
+    steps = load(script_file(given.scenario or SCENARIO), configuration.shared)
+    is_own = any(":" in entry for entry in configuration.shared.nodes)
+    return measure_scenario, swept_scenario(configuration, steps, sets), not is_own
 
 
-def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
-    """As `_of_scenario`, but a row of the table for each quantity, or the failure."""
+def _of_experiment(given: argparse.Namespace, sets: list[Values]) -> Runs:
+    """The experiment with each set."""
     if given.config != BASE_CONFIGURATION or given.values:
         raise ValueError(
             "an experiment has its own configuration; leave out --config and --set, and change its numbers with --vary"
         )
-    cases = swept(definition.load(given.experiment), axes, sets)
-    with batch_of(given, len(cases)) as batch:
-        found = results(measure, cases, *batch)
-    rows: list[tuple[Any, ...]] = []
-    reported = ["; ".join(one.result.reported) for one in found]
-    for values, one, text in zip(sets, found, reported, strict=True):
-        rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees, text) for c in one.result.rows]
-        rows += [(*values, one.failure, *[""] * 6)] * bool(one.failure)
-    _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees", "reported"), rows)
-    if given.picture:
-        _experiment_figure(given.picture, axes, sets, found)
-    return [one.failure for one in found], reported
+    return measure, swept(definition.load(given.experiment), sets), True
 
 
 def _axis(text: str) -> Axis:
@@ -181,49 +175,39 @@ def _axis(text: str) -> Axis:
     return Axis(name, tuple(parsed))
 
 
-def _write(file: Path, axes: list[Axis], fields: Iterable[str], rows: Iterable[tuple[Any, ...]]) -> None:
+def _table(sets: Sequence[Values], found: Sequence[MeasuredCase]) -> tuple[list[Values], list[str]]:
+    """A row for each set: its values, what went wrong, and what is known of each quantity; and the titles of these."""
+    rows, titles = [], dict[str, None]()
+    for values, (failure, result) in zip(sets, found, strict=True):
+        deviating = [one.quantity for one in result.rows if not one.agrees]
+        row = {**values, "failure": failure, "reported": "; ".join(result.reported), "deviating": "; ".join(deviating)}
+        for one in result.rows:
+            known = {one.title: one.measured, one.title + PREDICTED_TOO: one.predicted}
+            row |= {title: value for title, value in known.items() if value_text(value) != NOTHING}
+            titles[one.title] = None
+        rows.append(row)
+    return rows, list(titles)
+
+
+def _write(file: Path, rows: Sequence[Values]) -> None:
     with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow([*(axis.name for axis in axes), *fields])
+        writer = csv.DictWriter(stream, dict.fromkeys(name for row in rows for name in row), restval="")
+        writer.writeheader()
         writer.writerows(rows)
 
 
-def _scenario_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Sequence[SweepResult]) -> None:
-    """One panel for each parameter; runs that failed are crosses on the axis."""
-    good = [[r.force_rms] if not r.failure and math.isfinite(r.force_rms) else [] for r in found]
-    bad = [[0.0] if r.failure else [] for r in found]
-    rows = {"rms of the settled force error [N]": [("held", "o", TRUE, good), ("failed", "x", MEASURED, bad)]}
-    _draw(file, axes, sets, rows)
-
-
-def _experiment_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Sequence[ExperimentRecord]) -> None:
-    """One row for each quantity that is a number, one column for each parameter."""
-    units = {c.quantity: c.unit for one in found for c in one.result.rows if not isinstance(c.measured, str)}
-
-    def values(quantity: str, role: str) -> list[list[float]]:
-        every = [[getattr(c, role) for c in one.result.rows if c.quantity == quantity] for one in found]
-        return [[value for value in some if not isinstance(value, str)] for some in every]
-
-    roles = (("predicted", TRUE), ("measured", MEASURED))
-    rows = {
-        f"{name} [{unit}]": [(role, "o", colour, values(name, role)) for role, colour in roles]
-        for name, unit in units.items()
-    }
-    _draw(file, axes, sets, rows)
-
-
-def _draw(file: Path, axes: Sequence[Axis], sets: Sets, rows: Mapping[str, Sequence[Points]]) -> None:
-    """A panel for each row and each parameter."""
-    count = max(len(rows), 1)
-    with panels(file, count, len(axes), 3.6 * len(axes), max(3.0, 2.2 * count)) as (_, shown):
-        for place, (name, lines) in enumerate(rows.items()):
-            for i, axis in enumerate(axes):
-                part = shown[place * len(axes) + i]
-                column = [row[i] if isinstance(row[i], (int, float)) else str(row[i]) for row in sets]
-                for label, marker, colour, found in lines:
-                    pairs = [(value, one) for value, some in zip(column, found, strict=True) for one in some]
-                    if pairs:
-                        across, up = zip(*pairs, strict=True)
-                        part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
-                part.set(xlabel=axis.name, ylabel=name)
-                part.legend()
+def _draw(file: Path, names: Sequence[str], rows: Sequence[Values], titles: Sequence[str]) -> None:
+    """A panel for each number that is known and each parameter; a set that failed is a cross on the axis."""
+    numbers = [one for one in titles if any(isinstance(row.get(one), float) for row in rows)] or [""]
+    width, height = 3.6 * len(names), max(3.0, 2.2 * len(numbers))
+    with panels(file, len(numbers), len(names), width, height) as (_, shown):
+        for part, (title, name) in zip(shown, product(numbers, names), strict=True):
+            marks = [("measured", "o", MEASURED, title), ("predicted", "o", PREDICTED, title + PREDICTED_TOO)]
+            for label, marker, colour, column in (*marks, ("failed", "x", INK, "failure")):
+                seen = [(row[name], row[column]) for row in rows if row.get(column) not in (None, "")]
+                if seen:
+                    across = [value if isinstance(value, (int, float)) else str(value) for value, _ in seen]
+                    up = [0.0 if column == "failure" else value for _, value in seen]
+                    part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
+            part.set(xlabel=name, title="\n".join(textwrap.wrap(title, 50)))
+            part.legend()

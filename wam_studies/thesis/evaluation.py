@@ -13,6 +13,7 @@ from wam_studies.thesis.recording import Recording, Runs, recording
 from wam_studies.thesis.rows import Comparison, Result, plain
 
 Evaluation = Callable[[Runs], Result]
+LOWERED = "the guard lowered it; used: {}"
 
 
 def evaluate(experiment: Experiment, directory: Path) -> Result:
@@ -84,7 +85,7 @@ def _evaluate(experiment: Experiment, recordings: Runs) -> Result:
         f"{name.replace('_', ' ')}: {text}"
         for name, run in recordings.items()
         for text in (
-            f"the guard lowered it; used: {run.lowered}" * bool(run.lowered),
+            LOWERED.format(run.lowered) * bool(run.lowered),
             f"the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}" * bool(run.fault),
         )
         if text

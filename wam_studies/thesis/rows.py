@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, SupportsFloat
 
 from wam_analysis import table
+from wam_analysis.findings.finding import Finding
 from wam_studies.figures.panels import Panel
 from wam_studies.thesis.bounds import BOUNDS
 
@@ -25,6 +26,11 @@ class Comparison(NamedTuple):
     bound: float = 0.0
     equation: str = ""
     absolute: bool = False
+
+    @property
+    def title(self) -> str:
+        """Of its column: the quantity with its unit."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
     @property
     def deviation(self) -> float:
@@ -78,6 +84,12 @@ def below(quantity: str, measured: SupportsFloat, unit: str, most: float, equati
 def noted(quantity: str, measured: SupportsFloat, unit: str) -> Comparison:
     """A measured number of which nothing is claimed."""
     return Comparison(quantity, math.nan, float(measured), unit, math.nan)
+
+
+def of_finding(found: Finding) -> Comparison:
+    """A number of an analysis; one that is only a bound was not measured."""
+    measured = math.nan if found.is_lower_bound else found.measured
+    return Comparison(found.name, found.predicted, measured, found.unit, found.bound, absolute=True)
 
 
 class Result(NamedTuple):
