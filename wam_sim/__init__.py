@@ -8,6 +8,6 @@
 - reactions: what the force loop did instead of what was commanded, and whether a step was carried out
 - replay: recorded inputs through a node again, its outputs compared with the recorded ones
 - batch: one function over many inputs on any executor; pieces: its finished results on disk
-- sweep: one scenario with many parameter sets
+- sweep: parameter sets: every combination, a list, or drawn at random
 - progress: how far a long computation is, for a terminal
 """

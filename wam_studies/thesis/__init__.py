@@ -10,7 +10,7 @@ bounds          what the evaluations allow
 rows            a result: predicted and measured quantities, curves, tables
 claims          what the thesis claims and where it is shown: rows of docs/thesis.yaml
 samples         the sample bags and their index; cutting makes them of recordings
-measurement     records the runs of an experiment and evaluates them, also with many parameter sets
+measurement     records an experiment or a scenario and measures the bags, also with many parameter sets
 
 limit_cycles    stiction (5.8), (5.9); actuator (5.20) to (5.22)
 testbed         section 5.6: stable gain with friction, step size, saturation and delay
