@@ -220,7 +220,7 @@ class AnalysedRecording:
     def unassessed(self) -> tuple[list[RecordedStep], str]:
         """The steps that are too short to be assessed, and that in words."""
         settling = live_numbers(self.run, FORCE_LOOP, SETTLING_TIME)
-        watched = watched_times(self.tasks, without_forces=True)
+        watched = watched_times(self.tasks)
         found = unassessed(self.reactions, watched, self.steps, settling)
         return found, too_short(settling, found)
 

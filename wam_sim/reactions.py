@@ -132,21 +132,15 @@ def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[Playe
     ]
 
 
-def watched_times(
-    tasks: Iterable[tuple[TaskCommand | None, int, int]], without_forces: bool = False
-) -> list[tuple[int, int]]:
+def watched_times(tasks: Iterable[tuple[TaskCommand | None, int, int]]) -> list[tuple[int, int]]:
     """Begin and end of each time in which tasks, given with theirs in ns, command the same axes that are watched.
 
-    With `without_forces` those of links do not count: how far such a force is off, a report has from the simulator.
+    Forces of links do not count: how far such a force is off, a report has from the simulator.
     """
     times: list[tuple[list[str], int, int]] = []
     for task, begin, end in tasks:
         since = begin
-        axes = [
-            axis.name
-            for axis in watched_axes(task)
-            if not (without_forces and axis.kind is AxisKind.FORCE and axis.joint < 0)
-        ]
+        axes = [axis.name for axis in watched_axes(task) if axis.kind is not AxisKind.FORCE or axis.joint >= 0]
         if times and (times[-1][0], times[-1][2]) == (axes, begin):
             _, since, _ = times.pop()
         times.append((axes, since, end))

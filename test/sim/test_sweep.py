@@ -70,13 +70,11 @@ def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> N
     [
         ("link", [0.0, -20.0, 0.0], 1.2, -11.8),
         ("base", [0.0, 0.0, -20.0], 1.2, -11.8),
-        ("link", [0.0, 20.0, 0.0], 1.2, -100.0),  # nothing is touched
+        ("link", [0.0, 20.0, 0.0], 1.0, -100.0),  # nothing is touched; not too brief
         ("link", [0.0, -20.0, 0.0], 0.4, float("nan")),  # too brief to be steady
     ],
 )
-def test_the_error_of_a_force_in_any_frame(
-    frame: str, newtons: list[float], seconds: float, error: float, tmp_path: Path
-) -> None:
+def test_the_error_of_a_force(frame: str, newtons: list[float], seconds: float, error: float, tmp_path: Path) -> None:
     file = tmp_path / "force.yaml"
     text = STEPS.replace("link", frame).replace("[0.0, -20.0, 0.0]", str(newtons))
     file.write_text(text.replace("0.4", str(seconds)))
@@ -85,6 +83,12 @@ def test_the_error_of_a_force_in_any_frame(
     brief = ("press: 20 N commanded on link for less than 1 s, so it has no steady state.",)
     assert (found.result.reported == brief) == (seconds < 1.0)
     assert not found.failure
+
+
+@pytest.mark.slow
+def test_a_force_that_changes_all_the_time_is_not_too_brief(script: Path) -> None:
+    script.write_text(STEPS.replace("force:", "chirp: {newtons: 2.0, from: 1.0, to: 3.0}, force:"))
+    assert measure_scenario(runs(script, (0.004,))[0]).result.reported == ()
 
 
 @pytest.mark.slow
@@ -103,6 +107,7 @@ steps:
         configuration = Configuration.load(packaged("wam")).with_values({"force_loop:limits.doubt": 5.0})
         (case,) = swept_scenario(configuration, load(file, configuration.shared), [{}])
         found.append(measure_scenario(case))
+    assert [one.result.reported for one in found] == [(), ("Failed: correct link (another link than inner_link).",)]
     alone, hidden = (number(one, "press: true force") for one in found)
     assert alone == pytest.approx(8.0, abs=3.0)  # without a known position the force is known to 2 N
     assert hidden == pytest.approx(float("nan"), nan_ok=True)
@@ -140,7 +145,7 @@ steps:
     ("seconds", "command", "report"),
     [
         (0.4, "torque: [0, 0, 0, 50]", "s: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
-        (3.0, "torque: [0, 0, 0, 2]", "Failed: commands carried out (not reached: press)."),
+        (3.0, "torque: [0, 0, 0, 2]", "s: torque of joint 4: 2 N m are commanded, but 0.00 N m have been measured"),
         (3.0, "force: {frame: outer_link, newtons: [0, -4, 0]}", "s: force along (0, -1, 0): 4 N are commanded, but"),
         (
             0.4,
@@ -150,9 +155,7 @@ steps:
         (0.4, "torque: [0, 0, 0, 0]", "press: not assessed: its force, torque or motion was commanded for at most 2 s"),
     ],
 )
-def test_a_task_that_the_loop_refuses_or_does_not_reach_is_reported_with_its_reason(
-    seconds: float, command: str, report: str, tmp_path: Path
-) -> None:
+def test_a_task_that_is_not_done_has_its_reason(seconds: float, command: str, report: str, tmp_path: Path) -> None:
     file = tmp_path / "task.yaml"
     press = f"- {{name: press, seconds: {seconds}, {command}}}"
     file.write_text(f"steps:\n- {{name: release, seconds: 0.1, request: enable}}\n{press}\n")
@@ -207,7 +210,7 @@ def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path)
     with table.open() as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row[GAIN]) for row in rows] == pytest.approx([0.004, 0.02])
-    assert all(float(row["press: commanded force [N]"]) == 20.0 for row in rows)
+    assert all(20.0 < float(row["press: largest force [N]"]) < 25.0 for row in rows)
     assert plot.stat().st_size > 5000
 
 

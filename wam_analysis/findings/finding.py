@@ -42,7 +42,7 @@ class Finding(NamedTuple):
     @property
     def title(self) -> str:
         """Of its row or column: the quantity with its unit."""
-        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+        return titled(self.quantity, self.unit)
 
     @property
     def bound(self) -> float:
@@ -104,6 +104,11 @@ def shown(value: float, unit: str = "") -> str:
     text = f"{value:.3g}" if 1e-3 <= abs(value) < 999.5 or value == 0.0 else f"{value:.2e}"
     text = f"{value:.0f}" if 999.5 <= abs(value) < 1e4 else text
     return f"{text} {unit}".rstrip()
+
+
+def titled(quantity: str, unit: str) -> str:
+    """A quantity with its unit, '' for a pure number."""
+    return f"{quantity} [{unit}]" if unit else quantity
 
 
 def stated(text: str) -> str:

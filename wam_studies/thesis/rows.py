@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, SupportsFloat
 
 from wam_analysis import table
-from wam_analysis.findings.finding import Finding
+from wam_analysis.findings.finding import Finding, titled
 from wam_studies.figures.panels import Panel
 from wam_studies.thesis.bounds import BOUNDS
 
@@ -30,7 +30,7 @@ class Comparison(NamedTuple):
     @property
     def title(self) -> str:
         """Of its column: the quantity with its unit."""
-        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+        return titled(self.quantity, self.unit)
 
     @property
     def deviation(self) -> float:
@@ -87,9 +87,10 @@ def noted(quantity: str, measured: SupportsFloat, unit: str) -> Comparison:
 
 
 def of_finding(found: Finding) -> Comparison:
-    """A number of an analysis; one that is only a bound was not measured."""
+    """A number of an analysis; one that is only a bound was not measured, and nothing is claimed of what was not."""
     measured = math.nan if found.is_lower_bound else found.measured
-    return Comparison(found.name, found.predicted, measured, found.unit, found.bound, absolute=True)
+    bound = math.nan if math.isnan(measured) else found.bound
+    return Comparison(found.name, found.predicted, measured, found.unit, bound, absolute=True)
 
 
 class Result(NamedTuple):
