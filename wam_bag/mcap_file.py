@@ -10,14 +10,16 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Message, Schema, Statistics
+from mcap.records import Channel, Chunk, Message, Schema, Statistics
 
 from wam_bag.errors import Damage, NotClosedError, TooLargeError
 from wam_bag.limits import READING_LIMITS
@@ -27,6 +29,7 @@ from wam_bag.mcap_records import (
     FOOTER_SIZE,
     HEAD,
     LARGEST_ATTACHMENT,
+    LARGEST_CHUNK,
     MAGIC,
     MESSAGE,
     ChunkPlace,
@@ -34,6 +37,7 @@ from wam_bag.mcap_records import (
     checked,
     chunk_index,
     decompress,
+    expanded,
     parsed,
     walk,
 )
@@ -140,7 +144,9 @@ class McapFile(BagFile):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         with path.open("rb") as stream:
-            self._data = self._stack.enter_context(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
+            self._data: bytes | mmap.mmap = self._stack.enter_context(
+                mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+            )
         self.size = len(self._data)
         self._blocks: list[ChunkPlace] = []
         self._others: list[RecordExtent] = []  # attachments and metadata
@@ -156,7 +162,7 @@ class McapFile(BagFile):
         NotClosedError
             if it was not finished: its writer was killed, or the copy is incomplete.
         """
-        position = self._read_header()
+        position = self.data_start()
         if not self.has_end():
             raise NotClosedError("it was not closed")
         chunks, _ = self._read_summary()
@@ -174,7 +180,7 @@ class McapFile(BagFile):
         The file is walked through up to the first bytes that are no record; then follow the records that a
         summary names behind them.
         """
-        position = self._read_header()
+        position = self.data_start()
         places = [position]
         with contextlib.suppress(ValueError):
             chunks, others = self._read_summary()
@@ -184,10 +190,22 @@ class McapFile(BagFile):
                 continue
             with contextlib.suppress(Damage):
                 for record in walk(self._data, place, self.size):
-                    if record.opcode not in _OF_DATA:
+                    if record.opcode not in _OF_DATA and record.opcode < FIRST_PRIVATE:
                         break
                     yield record
                     position = record.end
+
+    def beginning(self, position: int) -> Iterator[tuple[RecordExtent, RecordExtent]]:
+        """The whole records of a chunk that breaks off, and what is behind each.
+
+        From then on, places are those in this chunk, decompressed.
+        """
+        if not self.has_end() and self._data[position] == Opcode.CHUNK:
+            chunk = Chunk.read(ReadDataStream(BytesIO(self._data[position + HEAD.size :])))
+            self._data = expanded(chunk, LARGEST_CHUNK, self._zstd)
+            size = len(self._data)
+            for record in walk(self._data, 0, size):
+                yield record, RecordExtent(Opcode.MESSAGE, record.end, size)
 
     def data_size(self) -> int:
         """Bytes of the file without its end, if it has one."""
@@ -269,7 +287,7 @@ class McapFile(BagFile):
         if kept.setdefault(record.id, record) != record:
             raise Damage(f"{Opcode(opcode).name.lower()} {record.id} is defined twice, differently")
 
-    def _read_header(self) -> int:
+    def data_start(self) -> int:
         """Where the data start, behind the header."""
         header = next(walk(self._data, len(MAGIC), self.size), None)
         if header is None or header.opcode != Opcode.HEADER:

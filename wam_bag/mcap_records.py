@@ -152,7 +152,17 @@ def decompress(place: ChunkPlace, record: bytes, into: Bytes, zstd: zstandard.Zs
     described = chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size
     if described != (place.first, place.last, place.size):
         raise Damage(f"{where} and its index differ")
-    data, most = chunk.data, len(into) + 1  # the library's own decompression allocates what the data ask for
+    data = expanded(chunk, len(into) + 1, zstd)
+    if len(data) != len(into):
+        raise Damage(f"{where} holds {len(data)} bytes, or more, instead of {len(into)}")
+    if chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data):
+        raise Damage(f"{where} does not match its checksum")
+    into.data[:] = data
+
+
+def expanded(chunk: records.Chunk, most: int, zstd: zstandard.ZstdDecompressor) -> bytes:
+    """Its records, at most so many bytes; the library's own decompression allocates what the data ask for."""
+    data: bytes = chunk.data
     if chunk.compression == "zstd":
         with zstd.stream_reader(data) as stream:
             data = stream.read(most)
@@ -160,8 +170,4 @@ def decompress(place: ChunkPlace, record: bytes, into: Bytes, zstd: zstandard.Zs
         data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
     elif chunk.compression:
         raise Damage(f"a chunk is compressed with {chunk.compression!r}; 'zstd', 'lz4' and none are read")
-    if len(data) != len(into):
-        raise Damage(f"{where} holds {len(data)} bytes, or more, instead of {len(into)}")
-    if chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data):
-        raise Damage(f"{where} does not match its checksum")
-    into.data[:] = data
+    return data

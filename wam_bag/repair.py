@@ -1,5 +1,6 @@
 """Bags repaired: files that were not closed, or are damaged, written again from what can be read of them."""
 
+import contextlib
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -66,8 +67,6 @@ def repair(path: Path) -> list[Repaired]:
 
 
 def _repair_file(path: Path) -> Repaired:
-    for unfinished in path.parent.glob(f"*{UNFINISHED}"):
-        unfinished.unlink()
     try:
         counts = _count(path)
         return Repaired(path.name, sum(counts.by_channel.values()), counts.first, None)
@@ -76,11 +75,14 @@ def _repair_file(path: Path) -> Repaired:
     except BROKEN:
         pass
     new = path.with_name(path.name + UNFINISHED)
+    new.unlink(missing_ok=True)
     try:
         with McapFile(path) as file, new.open("xb", buffering=0) as stream:
             losses = _Copy(file, McapWriter(stream, LIBRARY, CHUNK_SIZE)).run()
             os.fsync(stream.fileno())
         counts = _count(new)
+        if losses.holes and not counts.by_channel:
+            raise Damage("no message in it can be read")
         new.replace(path)
     except BROKEN as error:
         raise BagError(f"{path} cannot be repaired: {error}; nothing was changed") from None
@@ -114,17 +116,24 @@ class _Copy:
     def run(self) -> FileLosses:
         """Copy everything; returns what is lost."""
         file, writer = self._file, self._writer
-        position = 0
+        position = file.data_start()
         for record in list(file.salvage()):  # all of them first: the definitions at the end may be needed
-            if position and record.start > position:
+            if record.start > position:
                 self._lose(RecordExtent(Opcode.MESSAGE, position, record.start))
             position = max(position, record.end)
             try:
                 self._copy(record)
+            except (TooLargeError, MemoryError):  # another program, or computer, can read it
+                raise
             except BROKEN:
                 self._lose(record)
-        if file.data_size() > position and not file.is_data_end(position):
-            self._lose(RecordExtent(Opcode.MESSAGE, position, file.data_size()))
+        rest = RecordExtent(Opcode.MESSAGE, position, file.data_size())
+        if rest.end > position and not file.is_data_end(position):
+            with contextlib.suppress(*BROKEN):
+                for record, behind in file.beginning(position):
+                    self._copy(record)
+                    rest = behind
+            self._lose(rest)
         writer.flush()
         losses = self._losses()
         number = sum(key.startswith(file.path.name) for key in self._earlier)

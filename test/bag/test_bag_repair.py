@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -45,11 +46,13 @@ def record(path: Path, samples: list[Sample], split: Split = WHOLE) -> BagWriter
     return bag
 
 
-def killed(path: Path, samples: list[Sample], split: Split = WHOLE) -> None:
+def killed(path: Path, samples: list[Sample], split: Split = WHOLE, parameters: bytes = b"") -> None:
     """A bag as a killed recorder leaves it: what is in memory is lost, nothing is closed."""
     child = os.fork()
     if child == 0:
-        record(path, samples, split)
+        bag = record(path, samples, split)
+        if parameters:
+            bag.attach("parameters.yaml", "application/yaml", parameters)
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
 
@@ -65,11 +68,8 @@ def written(samples: list[Sample]) -> list[bytes]:
 def assert_others_read_it(path: Path, count: int) -> None:
     with AnyReader([path]) as reader:
         assert sum(1 for _ in reader.messages()) == count
-    found = 0
-    for file in path.glob("*.mcap"):
-        with file.open("rb") as stream:
-            found += sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
-    assert found == count
+    streams = [BytesIO(file.read_bytes()) for file in path.glob("*.mcap")]
+    assert sum(1 for one in streams for _ in make_reader(one, validate_crcs=True).iter_messages()) == count
 
 
 def samples_of(number: int) -> list[Sample]:
@@ -134,11 +134,12 @@ def test_a_repair_that_is_killed_before_its_last_step_has_changed_nothing(tmp_pa
 
 def test_a_repair_that_fails_leaves_the_bag_as_it_was(tmp_path: Path) -> None:
     file = write(tmp_path / "bag.mcap", samples_of(20))
-    hopeless = b"\x89MCAP0\r\n" + b"\xff" * 20 + file.read_bytes()[28:]
-    file.write_bytes(hopeless)
-    with pytest.raises(BagError, match=r"cannot be repaired.*nothing was changed"):
-        repair(file)
-    assert file.read_bytes() == hopeless
+    whole = file.read_bytes()
+    for hopeless in (b"\x89MCAP0\r\n" + b"\xff" * 20 + whole[28:], whole[:300]):
+        file.write_bytes(hopeless)
+        with pytest.raises(BagError, match=r"cannot be repaired.*nothing was changed"):
+            repair(file)
+        assert file.read_bytes() == hopeless
     assert list(tmp_path.iterdir()) == [file]
 
 
@@ -158,17 +159,32 @@ def test_what_stands_before_a_cut_is_saved_however_it_was_written(tmp_path: Path
         assert len(found) > 5 or WAYS[way].chunk_size > 10000
 
 
+@pytest.mark.parametrize(("way", "least"), [("none", 1380), ("lz4", 1200), ("zstd", 1200)])
+def test_the_whole_messages_of_a_chunk_that_breaks_off_are_saved(tmp_path: Path, way: str, least: int) -> None:
+    samples = samples_of(2000)
+    file = write(tmp_path / "bag.mcap", samples, WAYS[way]._replace(chunk_size=2**24))
+    file.write_bytes(file.read_bytes()[: int(0.6 * file.stat().st_size)])
+    (result,) = repair(file)
+    assert result.messages >= least
+    assert serialized(file) == written(samples[: result.messages])
+
+
+def broken(file: Path, number: int) -> tuple[int, int]:
+    """Turn one byte of a chunk; its first and last log time."""
+    with file.open("rb") as stream:
+        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
+    data = bytearray(file.read_bytes())
+    data[data.index(chunks[number].data) + 30] ^= 255
+    file.write_bytes(data)
+    return chunks[number].message_start_time, chunks[number].message_end_time
+
+
 def test_around_a_damaged_chunk_everything_is_saved(tmp_path: Path) -> None:
     samples = samples_of(400)
     file = write(tmp_path / "bag.mcap", samples, Way(chunk_size=2000))
-    data = bytearray(file.read_bytes())
-    with file.open("rb") as stream:
-        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
-    data[data.index(chunks[5].data) + 30] ^= 255
-    file.write_bytes(data)
+    first, last = broken(file, 5)
     (result,) = repair(file)
     lost = set(written(samples)) - set(serialized(file))
-    first, last = chunks[5].message_start_time, chunks[5].message_end_time
     assert lost == {sample.data for sample in samples if first <= sample.time <= last}
     assert result.losses is not None
     assert result.losses.bytes > 0
@@ -183,13 +199,7 @@ def damaged(path: Path, samples: list[Sample], number: int) -> tuple[int, int]:
         "recording", {"mode": "lockstep", **{f"{topic} driver received": str(n) for topic, n in counts.items()}}
     )
     bag.close()
-    file = path / f"{path.name}_0.mcap"
-    with file.open("rb") as stream:
-        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
-    data = bytearray(file.read_bytes())
-    data[data.index(chunks[number].data) + 30] ^= 255
-    file.write_bytes(data)
-    return chunks[number].message_start_time, chunks[number].message_end_time
+    return broken(path / f"{path.name}_0.mcap", number)
 
 
 def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path: Path) -> None:
@@ -215,12 +225,7 @@ def test_the_losses_of_two_repairs_stand_side_by_side(tmp_path: Path) -> None:
     samples = samples_of(100)
     damaged(tmp_path / "bag", samples, 2)
     repair(tmp_path / "bag")
-    file = tmp_path / "bag" / "bag_0.mcap"
-    with file.open("rb") as stream:
-        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
-    data = bytearray(file.read_bytes())
-    data[data.index(chunks[7].data) + 30] ^= 255
-    file.write_bytes(data)
+    broken(tmp_path / "bag" / "bag_0.mcap", 7)
     repair(tmp_path / "bag")
     found = read(tmp_path / "bag", ())
     lost = found.losses
@@ -256,13 +261,8 @@ def test_one_file_of_several_and_a_cut_are_not_held_against_the_counts_of_the_wh
 
 
 def test_after_a_kill_the_mode_is_that_of_the_parameters(tmp_path: Path) -> None:
-    child = os.fork()
-    if child == 0:
-        bag = record(tmp_path / "bag", samples_of(20))
-        values = {"/wam/driver": {"ros__parameters": {"timing": {"mode": "realtime"}}}}
-        bag.attach("parameters.yaml", "application/yaml", yaml.safe_dump(values).encode())
-        os.kill(os.getpid(), signal.SIGKILL)
-    os.waitpid(child, 0)
+    values = {"/wam/driver": {"ros__parameters": {"timing": {"mode": "realtime"}}}}
+    killed(tmp_path / "bag", samples_of(20), parameters=yaml.safe_dump(values).encode())
     repair(tmp_path / "bag")
     lines = described(read(tmp_path / "bag", ()))
     assert lines[0].startswith("INCOMPLETE: bag_0.mcap had not been closed")
