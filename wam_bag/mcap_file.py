@@ -195,17 +195,13 @@ class McapFile(BagFile):
                     yield record
                     position = record.end
 
-    def beginning(self, position: int) -> Iterator[tuple[RecordExtent, RecordExtent]]:
-        """The whole records of a chunk that breaks off, and what is behind each.
-
-        From then on, places are those in this chunk, decompressed.
-        """
+    def beginning(self, position: int) -> Iterator[RecordExtent]:
+        """The whole records of a chunk that breaks off at the end; from then on, places are in it, decompressed."""
         if not self.has_end() and self._data[position] == Opcode.CHUNK:
             chunk = Chunk.read(ReadDataStream(BytesIO(self._data[position + HEAD.size :])))
             self._data = expanded(chunk, LARGEST_CHUNK, self._zstd)
-            size = len(self._data)
-            for record in walk(self._data, 0, size):
-                yield record, RecordExtent(Opcode.MESSAGE, record.end, size)
+            self.size = len(self._data)
+            yield from walk(self._data, 0, self.size)
 
     def data_size(self) -> int:
         """Bytes of the file without its end, if it has one."""

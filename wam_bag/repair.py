@@ -67,27 +67,23 @@ def repair(path: Path) -> list[Repaired]:
 
 
 def _repair_file(path: Path) -> Repaired:
+    losses: FileLosses | None = None
     try:
         counts = _count(path)
-        return Repaired(path.name, sum(counts.by_channel.values()), counts.first, None)
-    except TooLargeError as error:
-        raise BagError(f"{path} cannot be repaired: {error}; nothing was changed") from None
     except BROKEN:
-        pass
-    new = path.with_name(path.name + UNFINISHED)
-    new.unlink(missing_ok=True)
-    try:
-        with McapFile(path) as file, new.open("xb", buffering=0) as stream:
-            losses = _Copy(file, McapWriter(stream, LIBRARY, CHUNK_SIZE)).run()
-            os.fsync(stream.fileno())
-        counts = _count(new)
-        if losses.holes and not counts.by_channel:
-            raise Damage("no message in it can be read")
-        new.replace(path)
-    except BROKEN as error:
-        raise BagError(f"{path} cannot be repaired: {error}; nothing was changed") from None
-    finally:
-        new.unlink(missing_ok=True)
+        new = path.with_name(path.name + UNFINISHED)
+        try:
+            with McapFile(path) as file, new.open("wb", buffering=0) as stream:
+                losses = _Copy(file, McapWriter(stream, LIBRARY, CHUNK_SIZE)).run()
+                os.fsync(stream.fileno())
+            counts = _count(new)
+            if losses.holes and not counts.by_channel:
+                raise Damage("no message in it can be read")
+            new.replace(path)
+        except BROKEN as error:
+            raise BagError(f"{path} cannot be repaired: {error}; nothing was changed") from None
+        finally:
+            new.unlink(missing_ok=True)
     return Repaired(path.name, sum(counts.by_channel.values()), counts.first, losses)
 
 
@@ -130,9 +126,9 @@ class _Copy:
         rest = RecordExtent(Opcode.MESSAGE, position, file.data_size())
         if rest.end > position and not file.is_data_end(position):
             with contextlib.suppress(*BROKEN):
-                for record, behind in file.beginning(position):
+                for record in file.beginning(position):
                     self._copy(record)
-                    rest = behind
+                    rest = RecordExtent(Opcode.MESSAGE, record.end, file.size)
             self._lose(rest)
         writer.flush()
         losses = self._losses()
