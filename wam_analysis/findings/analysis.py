@@ -206,8 +206,9 @@ def _line(title: str, found: list[tuple[str, str]], silent: str) -> str:
 
 def _foreign_line(recording: AnalysedRecording) -> str:
     """What another robot's recording is."""
-    found = {
-        "joint": {one.name for one in recording.sources if one.is_joint},
+    named = {(one.name, one.topic.rpartition("/")[0]) for one in recording.sources if one.is_joint}
+    found = {  # a joint of one robot may be in topics of namespaces below its own
+        "joint": [name for name, at in named if not any(at.startswith(f"{n}/") for o, n in named if o == name)],
         "wrench topic": {one.topic for one in recording.sources if not one.is_joint},
     }
     held = [counted(len(those), what) for what, those in found.items() if those]

@@ -45,10 +45,11 @@ def topics_section(recording: AnalysedRecording) -> Section:
 def _topic(name: str, columns: Columns) -> Iterator[str]:
     """What a topic holds."""
     if isinstance(columns, JointColumns) and len(columns.stamp_ns):
-        yield f"{name}: {len(columns.stamp_ns)} messages; joints: {', '.join(columns.names)}."
-        numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+        has = np.isfinite(np.hstack([columns.position, columns.velocity, columns.effort]))
         number = len(columns.names)
-        if none := [joint for i, joint in enumerate(columns.names) if not np.isfinite(numbers[:, i::number]).any()]:
+        messages = np.count_nonzero(np.any(has, axis=1)) or len(has)  # a table has rows of other topics
+        yield f"{name}: {messages} messages; joints: {', '.join(columns.names)}."
+        if none := [joint for i, joint in enumerate(columns.names) if not np.any(has[:, i::number])]:
             yield f"{name}: {', '.join(none)} without a number for position, velocity or effort."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
         largest = _largest(np.sqrt(np.nansum(columns.force**2, axis=1)))
