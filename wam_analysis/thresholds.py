@@ -214,6 +214,8 @@ class StreamThresholds:
     reset: int = 1_000_000_000
     away: int = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
     live: float = 0.1  # of the time that the stamps take: receptions in less are those of a file that was converted
+    drift: float = 1e-3  # of its speed, by which a clock is wrong: of quartz 1e-4 at most, while it is adjusted 5e-4
+    parts: int = 8  # instants at which two clocks are compared
     near: int = 20  # messages on both sides of a stamp that goes back, whose ages show whether the clock was set back
     faster: float = 30.0  # times the receptions: stamps that go on so fast are not in s
     slowest: float = 0.5  # s from message to message: fewer messages are hardly those of a robot
@@ -226,6 +228,7 @@ class StreamThresholds:
     exact: int = 1000  # ns: waits that differ by less are one
     steps: int = 64  # from stamp to stamp, from which a rate is known
     changes: float = 1.5  # periods: a step that is longer lacks a message, and a period that is longer is another one
+    regular: float = 0.5  # of the steps, within `pace` of whole periods: with fewer no message is known to be missing
     relayed: float = 0.6  # of the messages: so many change at most where each comes again
     evenly: float = 0.9  # of the changes of a signal: so many are as far apart, if it is held over between them
     counts: float = 2.0  # smallest changes: those of an encoder are mostly smaller

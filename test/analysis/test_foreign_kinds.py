@@ -107,11 +107,10 @@ def sparse() -> list[Case]:
         ("velocity alone", by_mcap_ros2, 80.0, lambda i: i % 5 == 0, ("velocity",), 1920),
     ]
     return [
-        Case(name, write, without(one("/joint_states", rate, 0.7, 0.5), lacks, *fields),
-             sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate, "/joint_states: missed periods": 0.0},
-             f"in only {kept} of {30.0 * rate:g} messages")
-        for name, write, rate, lacks, fields, kept in made
-    ] + [
+        *(Case(name, write, without(one("/joint_states", rate, 0.7, 0.5), lacks, *fields),
+               sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate, "/joint_states: missed periods": 0.0},
+               f"in only {kept} of {30.0 * rate:g} messages")
+          for name, write, rate, lacks, fields, kept in made),
         Case("in turns", sqlite, without(without(one("/js", 100.0, 0.7, 0.5), lambda i: i % 2, "effort"),
                                          lambda i: not i % 2, "position", "velocity"),
              sine(0.7, 0.5) | FRICTION, "1500 of 3000"),
@@ -156,6 +155,7 @@ def twice() -> list[Case]:
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
         Case("relayed", by_mcap_ros2, sent + relayed, expected, "3000 of 6000 messages repeat the one before"),
         Case("fast", ros1, stamped(one("/js", 50.0, 0.7, 0.5, None, 120.0), lambda t: 1.01 * t), {}, "a clock is fast"),
+        Case("faster", ros1, stamped(one("/js", 50.0, 0.7, 0.5, None, 10.0), lambda t: 1.08 * t), {}, "runs at 108 %"),
         Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
         Case("less of a part", sqlite, sent + without(again[:1000], bool, "effort"), expected, "the first message of"),
     ]
@@ -163,22 +163,23 @@ def twice() -> list[Case]:
 
 def by_chance() -> list[Case]:
     """Delays that change the order of messages, and values that are no numbers, which are no lost messages."""
-    drawn, sent = np.random.default_rng(5), one("/joint_states", 100.0, 0.7, 0.5)
+    drawn, sent, fast = np.random.default_rng(5), *(one("/joint_states", rate, 0.7, 0.5) for rate in (100.0, 1e3))
     late, mixed = ([s._replace(received=s.received + most * by) for s, by in zip(sent, drawn.random(3000), strict=True)]
                    for most in (0.03, 0.7))  # fmt: skip
     none = {"position": [math.nan, 0.2], "velocity": [math.nan, 0.0], "effort": [math.nan, 0.0], "name": ["a", "b"]}
     both = [{q: [*v, *none[q][1:]] for q, v in s.fields.items()} for s in sent]
     lacking = drawn.random(len(sent)) < 0.1
-    some = [s._replace(fields=none if lacks else fields)
-            for s, fields, lacks in zip(sent, both, lacking, strict=True)]  # fmt: skip
+    some = [s._replace(fields=none if lacks else has) for s, has, lacks in zip(sent, both, lacking, strict=True)]
     expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0, "/joint_states: missed periods": 0.0}
     played = [s._replace(stamp=s.stamp % 15.0, received=s.received + 0.008 * (i % 50 == 7)) for i, s in enumerate(sent)]
-    gap = {"/joint_states: longest gap between stamps": 0.01}
+    gap, jitter = {"/joint_states: longest gap between stamps": 0.01}, {"/joint_states: reception jitter": 12.2}
     after = [s._replace(stamp=32.0 + s.stamp / 300.0, received=32.001 + s.stamp / 300.0) for s in sent[:30]]
     told = f"in only {len(sent) - np.count_nonzero(lacking)} of {len(sent)}"
     return [
         Case("late", by_rosbags, late, expected),
         Case("in no order", by_rosbags, mixed, expected),
+        Case("late, some lost", sqlite, [s for s in late if drawn.random() > 0.1], jitter, "messages missing"),
+        Case("at any time", ros1, [s for s in fast if drawn.random() < 0.1], {}, "irregular stamps"),
         Case("played in a loop, some late", sqlite, played, expected | gap, "reception times are used"),
         Case("all at once after a pause", sqlite, sent + after, FRICTION, "messages missing"),
         Case("no numbers", sqlite, some, expected, told),
@@ -210,7 +211,7 @@ def names() -> list[Case]:
         Case("effort of one", ros1, one("/js", 100.0, 0.7, 0.5) + called("x", "y"), FRICTION | numbers("x", "y"), "",
              NOTHING, ("x: friction is not identified: no message has all of position, effort.",)),
         Case("nothing now and then", ros1, without(called("x", "y"), lambda i: i % 9 == 4, "position"),
-             numbers("x", "y"), "messages with no value"),
+             numbers("x", "y"), "messages with no value", NOTHING, ("1778 messages; joints",)),
     ]  # fmt: skip
 
 
@@ -231,7 +232,7 @@ def of_ros2_control() -> list[Case]:
             {"interface_names": ["effort", "position"], "values": [*s.fields["effort"], *s.fields["position"]]},
         ]}) for s in states
     ]  # fmt: skip
-    expected, followed = sine(0.7, 0.5) | FRICTION, ("as it was commanded.", "'messages': '3000 of 3000 ")
+    expected, followed = sine(0.7, 0.5) | FRICTION, ("as it was commanded.", ", 1 joint.", "'messages': '3000 of 3000 ")
     beside = interfaces + one("/joint_states", 50.0, 0.7, 0.5)
     return [
         Case("new controller", by_rosbags, controller("reference", "feedback"), expected, "", NOTHING, followed),
@@ -239,7 +240,8 @@ def of_ros2_control() -> list[Case]:
         Case("interfaces", by_rosbags, interfaces, expected, "", NOTHING, ("b: never moved.",)),
         Case("beside joint states", by_rosbags, beside, expected | {"/joint_states: period": 20.0}),
         Case("both", ros1, one("/joint_states", 50.0, 0.7, 0.5) + controller("desired", "actual"),
-             {"/joint_states a: cycle, peak to peak": 1.0, "/joint_states a: end": 30.0}, "", NOTHING, followed[:1]),
+             {"/joint_states a: cycle, peak to peak": 1.0, "/joint_states a: end": 30.0}, "", NOTHING, followed[:2]),
+        Case("2", sqlite, one("/l/js", 50.0, 0.7, 0.5) + one("/r/js", 50.0, 0.7, 0.5), {}, "", NOTHING, ("2 joints",)),
     ]  # fmt: skip
 
 
@@ -357,11 +359,10 @@ def zeros() -> list[Case]:
     away = one("/joint_states", 100.0, 0.7, 0.5, lambda q: q + 0.3 * (np.arange(len(q)) % 900 == 500))
     return [
         Case("there and back", sqlite, away, sine(0.7, 0.5) | FRICTION, "the position jumps away and back 3 times"),
-    ] + [
-        Case(f"{by:g}", write,
-             without(one("/joint_states", rate, 0.7, 0.5, moved(12.5, by, rate)), lambda _: True, *lacks),
-             sine(0.7, 0.5) | FRICTION, "the zero of the position moves once")
-        for write, rate, by, lacks in made
+        *(Case(f"{by:g}", write,
+               without(one("/joint_states", rate, 0.7, 0.5, moved(12.5, by, rate)), lambda _: True, *lacks),
+               sine(0.7, 0.5) | FRICTION, "the zero of the position moves once")
+          for write, rate, by, lacks in made),
     ]  # fmt: skip
 
 
@@ -433,8 +434,7 @@ def formats() -> list[Case]:
              {"7: frequency": 0.7}, "", MAPPED),
         Case("JSON of ROS", lambda path, sent: by_json(path, sent, "sensor_msgs/JointState"),
              without(one("/joint_states", 100.0, 0.7, 0.5), lambda _: True, "velocity"), sine(0.7, 0.5) | FRICTION),
-        Case("slash of a frame", by_rosbags, frames, step, "", commanded),
-        Case("slash of a frame, SQLite", sqlite, frames, step, "", commanded),
+        *(Case(f"slash, {n}", way, frames, step, "", commanded) for n, way in enumerate((by_rosbags, sqlite))),
     ]  # fmt: skip
 
 
@@ -559,6 +559,7 @@ def german(time: float) -> str:
     return f"{time:,.4f}".translate(str.maketrans(",.", ".,"))
 
 
+TITLES = ("position.a", "velocity.a", "effort.a")
 WITH_UNITS = ("time [ms]", "position.a (deg)", "velocity.a [deg/s]", "effort.a [mA]")
 OTHER_UNITS = (1e-3, math.pi / 180.0, math.pi / 180.0, 1e-3)
 TABLES = {
@@ -571,10 +572,8 @@ TABLES = {
     "decimal commas in quotes": Written(decimal=","),
     "separators of thousands": Written(("Time [ms]", *WITH_UNITS[1:]), OTHER_UNITS, ";", times=german),
     "the delimiter above": Written(delimiter=";", decimal=",", comment="sep=;\n"),
-    "two columns of time": Written(
-        ("s", "position.a", "velocity.a", "effort.a", "ns"), fields=("stamp=s,ns",), times=lambda time: int(time) + 50
-    ),
-    "two columns, us": Written(("s", "position.a", "velocity.a", "effort.a", "us"), fields=("stamp=s,us",), times=int),
+    "two columns": Written(("s", *TITLES, "ns"), fields=("stamp=s,ns",), times=lambda time: int(time) + 50),
+    "two columns, us": Written(("s", *TITLES, "us"), fields=("stamp=s,us",), times=int),
     "tabs": Written(delimiter="\t"),
     "bars": Written(delimiter="|"),
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
@@ -589,7 +588,7 @@ TABLES = {
     "a comment above": Written(comment="# recorded by hand\n"),
     "blanks": Written(delimiter=" "),
     "a number before each row": Written(("time", "position.a", "velocity.a", "effort.a", "")),
-    "titles as numpy writes them": Written(("# time", " position.a", " velocity.a", " effort.a")),
+    "titles as numpy writes them": Written(("# time", *(f" {title}" for title in TITLES))),
 }
 
 

@@ -26,7 +26,7 @@ def _own_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
     timing = recording.parameters.timing
     for name in TIMED:
         columns = recording.bag.topics.get(f"{recording.namespace}/{name}")
-        if isinstance(columns, STAMPED) and len(columns.stamp_ns) >= STREAM.shown:
+        if isinstance(columns, STAMPED) and len(columns.stamp_ns) >= STREAM.fewest:
             expected = math.nan
             if timing is not None:
                 expected = timing.period if name.startswith("motor_") else timing.outer_period_ns / 1e9
@@ -56,33 +56,37 @@ def timing_section(recording: AnalysedRecording) -> Section:
     findings, wrong = [], []
     streams = _foreign_streams(recording) if recording.is_foreign else _own_streams(recording)
     for name, stamp, received, expected in streams:
-        times = np.unique(stamp)
-        steps = np.diff(times)
-        periods = usual_steps(steps.astype(np.float64)) if len(steps) else np.full(1, math.nan)
-        period, slowest = float(np.median(steps)) / 1e9 if len(steps) else math.nan, float(np.max(periods)) / 1e9
+        times, rows = np.unique(stamp, return_index=True)
+        steps = np.diff(times).astype(np.float64)
+        periods = usual_steps(steps) if len(steps) else np.full(1, math.nan)
+        period, slowest = median(steps) / 1e9, float(np.max(periods)) / 1e9
         lost, gap, backwards = missed(times, periods), float(np.max(np.diff(stamp))) / 1e9, np.sum(np.diff(stamp) <= 0)
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * period, 1e3 * expected),
-            Finding(f"{name}: missed periods", "", float(lost)),
+            Finding(f"{name}: missed periods", "", lost),
             Finding(f"{name}: longest gap between stamps", "s", gap),
         ]
         if backwards:
             findings.append(Finding(f"{name}: stamps that do not increase", "", float(backwards)))
-        if received is not None:
-            waits = np.diff(np.sort(received).astype(np.float64)) / 1e9
+        if received is not None and np.ptp(received) > STREAM.live * np.ptp(stamp):  # of no file that was converted
+            waits = np.diff(np.sort(received)) / 1e9
+            usual = np.diff(received[rows])[steps <= STREAM.changes * periods] / 1e9  # with no message missing
             findings += [
                 Finding(f"{name}: period of the receptions", "ms", 1e3 * float(np.mean(waits))),
-                Finding(f"{name}: reception jitter", "ms", 1e3 * float(np.std(waits)), note="standard deviation"),
+                Finding(f"{name}: reception jitter", "ms", 1e3 * float(np.std(usual)), note="standard deviation"),
                 Finding(f"{name}: longest gap between receptions", "s", float(np.max(waits))),
             ]
-            sent, came = np.ptp(stamp), np.ptp(received)
-            if STREAM.reset < abs(came - sent) < came:  # not of a file that was converted
-                took = f"the stamps take {shown(sent / 1e9, 's')}, the receptions {shown(came / 1e9, 's')}"
-                wrong.append(f"{name}: {took}; a clock is fast or slow, or time was simulated.")
+            levels = np.linspace(0.05, 0.95, STREAM.parts)
+            at, passed = (np.quantile(each - each[0], levels) for each in (received, stamp))
+            (speed, _), ((variance, _), _) = np.polyfit(at, passed, 1, cov=True)  # delays that change are on no line
+            if abs(speed - 1.0) > max(STREAM.drift, SHAFT.noisy * math.sqrt(variance)):
+                what = f"the clock of the stamps runs at {100.0 * speed:.4g} % of that of the receptions"
+                wrong.append(f"{name}: {what}; a clock is fast or slow, or time was simulated.")
         if slowest > STREAM.changes * period:
             wrong.append(f"{name}: the period changes between {shown(period, 's')} and {shown(slowest, 's')}.")
         if lost:
-            wrong.append(f"{name}: {lost} messages missing; longest gap: {shown(gap, 's')}.")
+            what = f"{lost:.0f} messages missing" if lost > 0.0 else "irregular stamps, missing messages are not known"
+            wrong.append(f"{name}: {what}; longest gap: {shown(gap, 's')}.")
     silent = "No message is missing." if findings else "No stamped topic was recorded."
     sentences = wrong or [silent] * (recording.is_foreign or not findings)  # ours lists what is lost
     if timed := [facts for facts in recording.loop if RATE in facts]:
@@ -102,7 +106,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
 def provenance(recording: AnalysedRecording) -> dict[str, str]:
     """Origin of the recording and of its numbers."""
     bag = recording.bag
-    metadata = dict(bag.metadata.get(RECORDING, {}))
+    metadata, parameters = bag.metadata.get(RECORDING, {}), recording.run.parameters
     counts = {name: len(columns.log_time_ns) for name, columns in bag.topics.items()}
     whole = bag.counts or counts
     read = [counts.get(name, 0) for name in whole]  # a message of a controller has its command, too
@@ -116,9 +120,11 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
         "mode": recording.mode,
         "messages": f"{sum(read)} of {sum(whole.values())} needed and read",
         "lost": " ".join(recording.lost) or "none known",
-        "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",
-        **({"parameters, notes": "; ".join(recording.run.parameters.notes)} if recording.run.parameters.notes else {}),
+        "parameters, SHA-256": parameters.sha256 or "not in the bag",
+        **({"parameters, notes": "; ".join(parameters.notes)} if parameters.notes else {}),
         "analysed with": f"wam_stack {here}",
     }
-    recorder = {key: value for key, value in metadata.items() if not key.startswith("/") and key != "mode"}
-    return {**facts, **{f"recorded: {key}": value for key, value in recorder.items()}}
+    recorder = {
+        f"recorded: {key}": value for key, value in metadata.items() if not key.startswith("/") and key != "mode"
+    }
+    return facts | recorder

@@ -26,8 +26,7 @@ def usual_steps(steps: Numbers) -> Numbers:
 
     Where many are missing the median of all is longer than a period.
     """
-    usual = float(np.median(steps))
-    usual = float(np.median(steps[np.rint(steps / usual) == 1.0]))
+    usual = np.median(steps[np.rint(steps / np.median(steps)) == 1.0])
     number = len(steps) // STREAM.steps
     if not number:
         return np.full(len(steps), usual)
@@ -39,8 +38,10 @@ def usual_steps(steps: Numbers) -> Numbers:
     return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
 
 
-def missed(times: Times, periods: Numbers) -> int:
+def missed(times: Times, periods: Numbers) -> float:
     """Messages that are missing among rising times: what came late is near the time that it left out.
+
+    NaN where most steps are no multiple of the period, so that there is none.
 
     Parameters
     ----------
@@ -48,12 +49,16 @@ def missed(times: Times, periods: Numbers) -> int:
     periods : (n - 1,), the usual steps about each, see `usual_steps`.
     """
     steps = np.diff(times)
-    rows = np.flatnonzero(steps > STREAM.changes * periods)
+    parts = steps / periods
+    whole = np.maximum(np.rint(parts), 1.0)
+    if np.count_nonzero(np.abs(parts - whole) <= STREAM.pace) < STREAM.regular * len(parts):
+        return math.nan
+    rows = np.flatnonzero(parts > STREAM.changes)
     long, period = steps[rows], periods[rows]
     first = np.searchsorted(times, times[rows] - long)
     last = np.searchsorted(times, times[rows + 1] + long, side="right") - 1
     there = (times[last] - times[first]) / period - (last - first)
-    return int(np.sum(np.clip(np.rint(there), 0, np.rint(long / period) - 1)))
+    return float(np.sum(np.clip(np.rint(there), 0, whole[rows] - 1.0)))
 
 
 def runs(mask: Mask) -> Rows:
