@@ -51,8 +51,10 @@ def repair(path: Path) -> list[Repaired]:
     if path.is_file():
         return [_repair_file(path)]
     found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
-    if not found:
-        raise BagError(f"{path} does not exist, or has no .mcap file; give a bag directory or an .mcap file")
+    if not found or any(path.glob("*.zstd")):  # metadata.yaml would no longer list those
+        raise BagError(
+            f"{path} does not exist, has no .mcap file, or has compressed ones; give a bag directory or an .mcap file"
+        )
     release(path)
     done = []
     for file in found:

@@ -227,8 +227,7 @@ def test_the_losses_of_two_repairs_stand_side_by_side(tmp_path: Path) -> None:
     repair(tmp_path / "bag")
     broken(tmp_path / "bag" / "bag_0.mcap", 7)
     repair(tmp_path / "bag")
-    found = read(tmp_path / "bag", ())
-    lost = found.losses
+    lost = (found := read(tmp_path / "bag", ())).losses
     assert list(lost.repaired) == ["bag_0.mcap", "bag_0.mcap (2)"]
     assert lost.by_topic == {topic: 50 - count for topic, count in found.counts.items()}
     assert lost.gone == 20
@@ -278,11 +277,13 @@ def test_a_bag_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
     bag.close()
     assert len(serialized(tmp_path / "bag")) == 20
     assert not (tmp_path / "bag" / RESERVE).exists()
+    (tmp_path / "bag" / "bag_1.mcap.zstd").touch()
+    with pytest.raises(BagError, match="has compressed ones"):
+        repair(tmp_path / "bag")
 
 
 def test_info_says_what_is_in_a_bag(tmp_path: Path) -> None:
-    samples = samples_of(100)
-    bag = record(tmp_path / "bag", samples, Split(4000, 0.0))
+    bag = record(tmp_path / "bag", samples_of(100), Split(4000, 0.0))
     bag.metadata("recording", {"mode": "lockstep", "/jointstate driver dropped": "3", "/clock driver dropped": "0"})
     bag.close()
     lines = described(read(tmp_path / "bag", ()))
