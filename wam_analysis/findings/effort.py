@@ -160,14 +160,22 @@ def friction(source: Source) -> tuple[Friction, float]:
     use = np.all([np.sign(velocity) == np.sign(np.roll(velocity, way)) for way in (near, -near)], axis=0)
     settled = fit(shift, use)
     if _is_known(settled) and (shift or settled.dynamic.error < found.dynamic.error):
-        found, shift = _best(lambda lag: fit(lag, use), most)
+        found, shift = _best(lambda lag: fit(lag, use), most, shift)
+        # a filter is no delay, and the reversals show another one
+        both = [(name, getattr(found, name), getattr(settled, name)) for name in ("dynamic", "viscous", "inertia")]
+        found = found._replace(
+            **{name: one._replace(error=math.hypot(one.error, one.value - other.value)) for name, one, other in both}
+        )
     doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 
 
-def _best(fit: Callable[[int], Friction], most: int) -> tuple[Friction, int]:
-    """The fit with the shift of the effort, samples, that leaves least unexplained; none unless that is much."""
+def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Friction, int]:
+    """The fit with the shift of the effort, samples, that leaves least unexplained; none unless that is much less.
+
+    Where a shift was seen before, as at the reversals, there is one.
+    """
     step, best = max(1, most // 4), 0
     fits = {0: fit(0)}
     while step:
@@ -176,7 +184,7 @@ def _best(fit: Callable[[int], Friction], most: int) -> tuple[Friction, int]:
                 fits[shift] = fit(shift)
         nearest = min(fits, key=lambda shift: fits[shift].residual)
         step, best = (step if nearest != best and step > 1 else step // 2), nearest
-    best = best if fits[best].residual < SHAFT.much_better * fits[0].residual else 0
+    best = best if seen or fits[best].residual < SHAFT.much_better * fits[0].residual else 0
     return fits[best], best
 
 
