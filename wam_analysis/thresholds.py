@@ -44,6 +44,7 @@ class ShaftThresholds:
     unsure: float = 0.25  # of a number; with a larger standard error it is not identifiable
     hidden: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
     much_better: float = 0.5  # of the rest of a fit: one with a lag leaves less
+    better: float = 0.9  # the same of another lag than the reversals show
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1
@@ -106,6 +107,11 @@ class CycleThresholds:
     apart: int = 4  # times higher or lower frequencies, between which a line is reported if it is the strongest
     clear_line: float = 0.05  # of the largest line: smaller ones are not reported
     # steps
+    halvings: int = 4  # of an end until it is steady, at most
+    one_way: float = (
+        0.8  # of the range of its parts, which lies between the first and the last one where it still moves
+    )
+    at_end: float = 0.2  # of the settling band: a smaller motion is none
     # part of the settling band that noise may fill after smoothing, four standard deviations of it
     step_quiet: float = 0.1
     step_loudest: float = 0.5  # the same, where so much smoothing would make the rise longer

@@ -42,10 +42,12 @@ def at_rest(time: Any, names: list[str], seed: int, noise: float = 1e-5) -> Any:
     return np.linspace(-1.0, 1.0, len(names)) + noise * chance(seed).normal(size=(len(time), len(names)))
 
 
-def swung(time: Any, seed: int) -> tuple[Any, Any, Any]:
+WAVES = ((0.5, 0.31), (0.3, 0.53), (0.15, 1.07), (0.05, 1.9))
+
+
+def swung(time: Any, seed: int, waves: Any = WAVES) -> tuple[Any, Any, Any]:
     """Position, velocity and acceleration of a motion with several frequencies."""
     drawn = chance(seed)
-    waves = [(0.5, 0.31), (0.3, 0.53), (0.15, 1.07), (0.05, 1.9)]
     phases = drawn.uniform(0.0, 6.0, len(waves))
     parts = [(a, 2.0 * np.pi * f, p) for (a, f), p in zip(waves, phases, strict=True)]
     return (
@@ -623,10 +625,10 @@ def test_inertia_is_given_only_where_the_motion_tells_it_from_a_weight(
     assert " % of the effort (rms)" in told
 
 
-def recorded_late(effort: Any, how: float | str) -> Any:
-    """An effort through a filter of the first order at so many Hz, or 16 ms late."""
-    if isinstance(how, str):
-        return np.concatenate([np.full(4, effort[0]), effort[:-4]])
+def recorded_late(effort: Any, how: float) -> Any:
+    """An effort through a filter of the first order at so many Hz, or late by a whole number of samples."""
+    if isinstance(how, int):
+        return np.concatenate([np.full(how, effort[0]), effort[: len(effort) - how]])
     kept, late = math.exp(-2.0 * math.pi * how / RATE), effort.copy()
     for i in range(1, len(late)):
         late[i] = kept * late[i - 1] + (1.0 - kept) * 0.5 * (effort[i] + effort[i - 1])
@@ -635,20 +637,26 @@ def recorded_late(effort: Any, how: float | str) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("how", "drag", "said"), [*((how, 0.0, "behind the motion") for how in (20.0, 10.0, "late")), ("", 0.4, "")]
+    ("how", "drag", "weight"),
+    [
+        (0, 0.4, WEIGHT),
+        (20.0, 0.0, WEIGHT),
+        (10.0, 0.0, WEIGHT),
+        *((how, 0.0, w) for how in (2, 4, 6) for w in (0, WEIGHT)),
+    ],
 )
 def test_an_effort_that_lags_or_holds_a_drag_gives_the_friction_all_the_same(
-    how: float | str, drag: float, said: str, tmp_path: Path
+    how: float, drag: float, weight: float, tmp_path: Path
 ) -> None:
     time = times(40.0)
-    q, v, a = swung(time, 81)
-    effort = loaded(q, v, a, WEIGHT, 82) + drag * v * np.abs(v)
-    states = {"position": q, "velocity": v, "effort": recorded_late(effort, how) if how else effort}
+    q, v, a = swung(time, 81, WAVES if weight else ((0.8, 0.3), (0.2, 1.2)))
+    effort = loaded(q, v, a, weight, 82) + drag * v * np.abs(v)
+    states = {"position": q, "velocity": v, "effort": recorded_late(effort, how)}
     sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
     analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
     planted = {"j: dry friction": DRY, "j: viscous friction": VISCOUS, "j: inertia": INERTIA}
     assert {name: numbers.get(name) for name in planted} == pytest.approx(planted, rel=CLOSE)
-    assert said in section(analysis, "friction")[1]
+    assert how == 0 or "behind the motion" in section(analysis, "friction")[1]
 
 
 @pytest.mark.slow

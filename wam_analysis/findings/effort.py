@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -160,31 +161,40 @@ def friction(source: Source) -> tuple[Friction, float]:
     use = np.all([np.sign(velocity) == np.sign(np.roll(velocity, way)) for way in (near, -near)], axis=0)
     settled = fit(shift, use)
     if _is_known(settled) and (shift or settled.dynamic.error < found.dynamic.error):
-        found, shift = _best(lambda lag: fit(lag, use), most, shift)
-        # a filter is no delay, and the reversals show another one
-        both = [(name, getattr(found, name), getattr(settled, name)) for name in ("dynamic", "viscous", "inertia")]
+        fit = partial(fit, use=use)
+        found, shift = _best(fit, most, shift)
+    if shift:  # known to a sample
+        sides = fit(shift - 1), fit(shift + 1)
         found = found._replace(
-            **{name: one._replace(error=math.hypot(one.error, one.value - other.value)) for name, one, other in both}
+            dynamic=_between(found.dynamic, *(one.dynamic for one in sides)),
+            viscous=_between(found.viscous, *(one.viscous for one in sides)),
+            inertia=_between(found.inertia, *(one.inertia for one in sides)),
         )
     doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
 
 
-def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Friction, int]:
-    """The fit with the shift of the effort, samples, that leaves least unexplained; none unless that is much less.
+def _between(one: FrictionNumber, before: FrictionNumber, after: FrictionNumber) -> FrictionNumber:
+    """A number whose error is also half of what it differs by between two fits."""
+    return FrictionNumber(one.value, math.hypot(one.error, 0.5 * (after.value - before.value)))
 
-    Where a shift was seen before, as at the reversals, there is one.
+
+def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Friction, int]:
+    """The fit with the shift of the effort, samples, that leaves least unexplained; else 0, or the shift that was seen.
+
+    It must leave much less than 0 does, which the law of friction may do; of what was seen, clearly less.
     """
-    step, best = max(1, most // 4), 0
-    fits = {0: fit(0)}
+    step, best = max(1, most // 4), seen
+    fits = {seen: fit(seen)}
     while step:
         for shift in (best - step, best + step):
             if abs(shift) <= most and shift not in fits:
                 fits[shift] = fit(shift)
         nearest = min(fits, key=lambda shift: fits[shift].residual)
         step, best = (step if nearest != best and step > 1 else step // 2), nearest
-    best = best if seen or fits[best].residual < SHAFT.much_better * fits[0].residual else 0
+    share = SHAFT.better if seen else SHAFT.much_better
+    best = best if fits[best].residual < share * fits[seen].residual else seen
     return fits[best], best
 
 

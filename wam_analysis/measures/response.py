@@ -44,11 +44,12 @@ def step_response(
     time : (n,), s from the step, rising, at a constant rate; below 0 in a ramp that leads to it.
     value : (n,), the signal.
     begin : value before the step; NaN where it is not known.
-    steady : length of the end that counts as steady, s.
+    steady : length of the end that counts as steady, s; less where a part of it still moves one way.  What does so to
+        the end has no rise and has not settled.
     band : settling band as a part of the step, for example 0.02.
     least : a change that is not larger is no step.
     """
-    tail = value[time >= time[-1] - steady]
+    tail, is_steady = _end(value[time >= time[-1] - steady], begin, band)
     final, ripple = float(np.mean(tail)), float(np.ptp(tail)) / 2.0
     step = final - begin
     if not abs(step) > least:
@@ -67,11 +68,27 @@ def step_response(
     outside = np.flatnonzero(np.abs(part - 1.0) > band)
     if not len(outside):
         settling = 0.0
-    elif time[outside[-1]] >= time[-1] - steady:
+    elif not is_steady or time[outside[-1]] >= time[-len(tail)]:
         settling = math.inf  # what leaves the band in the steady end has not settled, wherever the recording stops
     else:
         settling = max(_between(time, np.abs(part - 1.0), int(outside[-1]), band), 0.0)
-    return StepResponse(final, ripple, high - low, settling, max(float(np.max(part)) - 1.0, 0.0))
+    rise = high - low if is_steady else math.nan
+    return StepResponse(final, ripple, rise, settling, max(float(np.max(part)) - 1.0, 0.0))
+
+
+def _end(tail: Numbers, begin: float, band: float) -> tuple[Numbers, bool]:
+    """The part of an end that does not move one way by much of the band, else the last eighth; whether there is one."""
+    change, is_steady = abs(float(np.mean(tail)) - begin), True
+    for _ in range(CYCLE.halvings):
+        if len(tail) < 2 * CYCLE.halvings:
+            break
+        means = np.array([np.mean(each) for each in np.array_split(tail, 2 * CYCLE.halvings)])
+        moved = abs(float(means[-1] - means[0]))
+        sure = 4.0 * noise(tail) * math.sqrt(4.0 * CYCLE.halvings / len(tail))
+        if is_steady := moved < CYCLE.one_way * np.ptp(means) or moved < max(CYCLE.at_end * band * change, sure):
+            break
+        tail = tail[len(tail) // 2 :]
+    return tail, is_steady
 
 
 def force_response(
