@@ -53,12 +53,13 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 taken.add(name)
                 change = 100.0 * (cycle.growth - 1.0)
                 is_steady = CYCLE.changing < cycle.growth < 1.0 / CYCLE.changing
-                alike[origin].append(name + f" (changes by {change:+.0f} % from half to half)" * (not is_steady))
+                changes = f" (changes by {change:+.0f} % from half to half)" * (not is_steady)
+                alike[origin].append(name + changes)
                 frequency = 1.0 / cycle.period
                 if origin in (LIMIT_CYCLE, UNKNOWN):
                     at = shown(frequency, "Hz")
                     text = f"{name} repeats at {at}, {shown(cycle.peak_to_peak, unit)} peak to peak"
-                    text += ", not commanded" * (origin == LIMIT_CYCLE)
+                    text += changes + ", not commanded" * (origin == LIMIT_CYCLE)
                     cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text))
                 findings += [
                     Finding(f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=origin, error=error),

@@ -23,9 +23,9 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     """Limit cycles in windows of the whole, of half, of a quarter ... of a signal, in the order of time.
 
     Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
-    window or beyond it, and is evaluated between these ends.  A motion that decays or grows between them is none.
-    There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow motion: one
-    that ends within a period is part of its shape.
+    window or beyond it, and is evaluated between these ends.  A motion that decays between them is none, one that grows
+    is one.  There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow
+    motion: one that ends within a period is part of its shape.
 
     Parameters
     ----------
@@ -57,7 +57,10 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
             is_shape = CYCLE.slowest_cycles * (last - first) < np.max(longest[first:last] % n)  # of a slower one
             goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-            if is_shape or goes_on or (better is None and _changes(time[inner], flat[inner], cycle.period)):
+            changing = None if better else _changing(time[inner], flat[inner], cycle.period)
+            if is_shape or goes_on or changing:
+                if changing and changing.growth > 1.0 and changing.cycles >= CYCLE.episode_cycles and not is_shape:
+                    found.append(Episode(float(time[first]), float(time[last - 1]), changing))
                 transients.append(_Transient(first, last, cycle.period, _width(time, cycle.period)))
                 lag = 0.0  # its last part is no limit cycle
             else:
@@ -140,8 +143,9 @@ def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: Ma
     return first, last
 
 
-def _changes(time: Numbers, flat: Numbers, period: float) -> bool:
-    """Whether a motion repeats at a period, but decays or grows."""
+def _changing(time: Numbers, flat: Numbers, period: float) -> LimitCycle | None:
+    """The cycle of a motion that repeats at a period, but decays or grows; None of any other."""
     cycle = limit_cycle(time, flat, period)
     change = 1.0 - min(cycle.growth, 1.0 / cycle.growth) if cycle.growth > 0.0 else 1.0
-    return cycle.cycles > 0.0 and change > 1.0 - CYCLE.sure and cycle.confidence + change >= CYCLE.sure
+    is_one = cycle.cycles > 0.0 and change > 1.0 - CYCLE.sure and cycle.confidence + change >= CYCLE.sure
+    return cycle if is_one else None
