@@ -105,7 +105,7 @@ class CycleThresholds:
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
     sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
     apart: int = 4  # times higher or lower frequencies, between which a line is reported if it is the strongest
-    clear_line: float = 0.05  # of the largest line: smaller ones are not reported
+    clear_line: float = 0.01  # of the largest line: smaller ones are not reported
     # steps
     halvings: int = 4  # of an end until it is steady, at most
     one_way: float = (

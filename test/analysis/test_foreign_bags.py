@@ -284,11 +284,11 @@ def one_commanded_sine(path: Path) -> Made:
 
 
 def coarse_encoder(path: Path) -> Made:
-    """An encoder with 4096 steps flickers by chance."""
+    """Encoders with 4096 steps: two flicker by chance, one turns slowly."""
     time = times(20.0)
     quantum = 2.0 * math.pi / 4096
-    steps = quantum * np.rint(0.5 + 0.3 * chance(29).normal(size=(len(time), 2)))
-    return by_rosbags(path, joints("/joint_states", time, ["a", "b"], position=steps)), TopicMap()
+    steps = np.rint(np.column_stack([0.5 + 0.3 * chance(29).normal(size=(len(time), 2)), 0.02 * time / quantum]))
+    return by_rosbags(path, joints("/joint_states", time, ["a", "b", "c"], position=quantum * steps)), TopicMap()
 
 
 def lossy_and_reset(path: Path) -> Made:

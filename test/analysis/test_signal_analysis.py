@@ -9,6 +9,7 @@ from wam_analysis.findings.efficiency import works
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_analysis.measures.lines import spectral_lines
 from wam_analysis.measures.response import force_response, step_response
 from wam_analysis.measures.runs import at_rest, missed, runs, usual_steps, without_turns
 from wam_analysis.measures.swings import swings
@@ -84,6 +85,12 @@ def test_a_cycle_wider_than_the_band_does_not_settle_wherever_the_recording_stop
     assert step_response(time, cycle - np.exp(-30.0 * time), 0.0, 1.0, 0.02).settling == math.inf
     fast = 1.0 + np.sin(2.0 * math.pi * time / 0.00525 + phase)  # of few samples in a period, which are no noise
     assert force_response(time, fast, 0.0, 1.0, 1.0)[1].verdict is Verdict.LIMIT_CYCLE
+
+
+def test_the_three_strongest_lines_are_listed_beside_a_much_larger_motion():
+    time, sizes = np.arange(10000) / 1000.0, {0.6: 0.5, 13.0: 0.02, 13.9: 0.015, 40.0: 0.001}
+    value = sum(size * np.sin(2.0 * math.pi * f * time) for f, size in sizes.items()) + draws(5, len(time), 1e-4)
+    assert [near(line.frequency) for line in spectral_lines(time, value, time)[:3]] == [0.6, 13.0, 13.9]
 
 
 # limit cycles

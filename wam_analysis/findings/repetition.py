@@ -88,7 +88,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         unit = one.units[quantity]
         for line in spectral_lines(piece.time, piece.values[quantity], piece.stamps):
             begins.append(line.frequency)
-            if 2.0 * line.amplitude > LEAST[unit]:
+            if 2.0 * line.amplitude > max(LEAST[unit], _count(piece.recorded[quantity])):
                 name = f"{label}, {shown(line.frequency, 'Hz')}"
                 findings.append(Finding(f"{name}: amplitude", unit, line.amplitude))
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
@@ -98,6 +98,12 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     span = f"To find vibrations below {least}, record longer without a gap."
     silent = f"No vibration was found above {least} that lasts throughout."
     return Section("frequency", "Spectrum", (span if findings else silent,), findings)
+
+
+def _count(value: Numbers) -> float:
+    """The smallest change of a signal, as a count of its encoder, which is no vibration; rounding apart."""
+    change = np.abs(np.diff(value))
+    return float(np.min(change[change > 1e-9 * np.ptp(value)], initial=np.ptp(value)))
 
 
 def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:
