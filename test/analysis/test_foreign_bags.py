@@ -401,7 +401,7 @@ def test_of_two_robots_neither_has_the_command_of_the_other(commands: str, origi
             sent += joints(f"/{side}/joint_command", time, names, position=values)
     topics = [f"/{side}/joint_command" for side in commands]
     two, one = section(quiet(by_rosbags(tmp_path / "bag", sent), *topics), "stability")
-    assert one.endswith("as it was commanded.")
+    assert one.endswith("at the commanded frequency.")
     assert two.startswith("/right")
     assert origin in two
 
@@ -442,7 +442,7 @@ def test_a_command_by_another_clock_is_that_of_the_motion(clock: str, whose: str
     ]
     found = quiet(by_rosbags(tmp_path / "bag", sent), "/joint_command")
     (one,) = (line for line in section(found, "stability") if line.startswith("a: "))
-    assert one.endswith("as it was commanded.")
+    assert one.endswith("at the commanded frequency.")
     told = [line for line in section(found, "happened") if "clock" in line]
     assert len(told) == 1
     assert (topics[whose] if clock == "never set" else "/joint_") in told[0]

@@ -232,7 +232,7 @@ def of_ros2_control() -> list[Case]:
             {"interface_names": ["effort", "position"], "values": [*s.fields["effort"], *s.fields["position"]]},
         ]}) for s in states
     ]  # fmt: skip
-    expected, followed = sine(0.7, 0.5) | FRICTION, ("as it was commanded.", ", 1 joint.", "'messages': '3000 of 3000 ")
+    expected, followed = sine(0.7, 0.5) | FRICTION, ("at the commanded frequency.", ", 1 joint.", "'messages': '3000 of 3000 ")
     beside = interfaces + one("/joint_states", 50.0, 0.7, 0.5)
     return [
         Case("new controller", by_rosbags, controller("reference", "feedback"), expected, "", NOTHING, followed),
@@ -706,6 +706,6 @@ def test_a_table_holds_commands_and_one_of_several_joints_has_the_name_of_its_co
     table |= {"tau (2)": effort, "force": effort}
     found = analyse(table, lambda doing: None, topic_map([], joints, [], ["position=q[2]", "effort=tau (2)"], []))
     told = " ".join(sentence for section in found.sections for sentence in section.sentences)
-    assert f"{name}: repeats as it was commanded" in told
+    assert f"{name}: repeats at the commanded frequency" in told
     assert "Taken as commands: joints_command" in told
     assert "Not used: q[1]; force; rename" in told

@@ -23,7 +23,7 @@ FIT = (
     "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where it fits "
     "better, a delay. The standard errors include what it does not explain."
 )
-NO_FRICTION = "The friction of the joints cannot be identified: no recorded effort shows friction."
+NO_FRICTION = "No friction is identified."
 
 
 def effort_section(recording: AnalysedRecording) -> Section:
@@ -61,7 +61,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
-    doubts += [RECORD] * bool(doubts or not sentences)
+    doubts += [RECORD] * bool(doubts or not (sentences or wrong))
     if alone:
         doubts.append(
             f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "

@@ -26,7 +26,7 @@ ORIGINS = {  # in words
     HARMONIC: f"{HARMONIC}: a limit cycle, or the commanded motion, which is not followed linearly",
     UNKNOWN: "its command is not known: give its topic with --command, or in a CSV file name its column "
     "command.position.JOINT",
-    COMMANDED_CYCLE: "repeats as it was commanded",
+    COMMANDED_CYCLE: "repeats at the commanded frequency",
 }
 
 
