@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.thresholds import STREAM
+from wam_analysis.thresholds import HOLD, STREAM
 from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import BagError, JointColumns
 from wam_control.task.scenario import FORCE_LOOP
@@ -45,6 +45,15 @@ def held_rows(stamps: Times, base: Times, held: int = STREAM.held) -> tuple[Inde
     row = row_at(stamps, base)
     age = base - stamps[row]
     return row, (age >= 0) & (age <= held_for(stamps, held))
+
+
+def force_changes(forces: Numbers) -> Mask:
+    """(n - 1,), whether each force but the first, (n, k) N, differs from that since the last change: also in a ramp."""
+    found, since = np.zeros(max(len(forces) - 1, 0), np.bool_), forces[:1]
+    for row in np.flatnonzero(np.any(np.diff(forces, axis=0) != 0.0, axis=1)).tolist():
+        if np.any(np.abs(forces[row + 1] - since) > HOLD.equal_force):
+            found[row], since = True, forces[row + 1]
+    return found
 
 
 def intervals(stamps: Times, changes: Mask, held: int) -> Iterator[tuple[int, int, int]]:

@@ -232,7 +232,10 @@ def of_ros2_control() -> list[Case]:
             {"interface_names": ["effort", "position"], "values": [*s.fields["effort"], *s.fields["position"]]},
         ]}) for s in states
     ]  # fmt: skip
-    expected, followed = sine(0.7, 0.5) | FRICTION, ("at the commanded frequency.", ", 1 joint.", "'messages': '3000 of 3000 ")
+    expected, followed = (
+        sine(0.7, 0.5) | FRICTION,
+        ("at the commanded frequency.", ", 1 joint.", "'messages': '3000 of 3000 "),
+    )
     beside = interfaces + one("/joint_states", 50.0, 0.7, 0.5)
     return [
         Case("new controller", by_rosbags, controller("reference", "feedback"), expected, "", NOTHING, followed),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wam_analysis.findings.efficiency import works
+from wam_analysis.held_messages import force_changes
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import limit_cycle
@@ -27,9 +28,6 @@ def near(value: float) -> object:
 
 def draws(seed: int, n: int, sd: float) -> np.ndarray:
     return sd * np.random.default_rng(seed).standard_normal(n)
-
-
-# steps
 
 
 def second_order(zeta: float, omega: float, time: np.ndarray) -> np.ndarray:
@@ -93,7 +91,10 @@ def test_the_three_strongest_lines_are_listed_beside_a_much_larger_motion():
     assert [near(line.frequency) for line in spectral_lines(time, value, time)[:3]] == [0.6, 13.0, 13.9]
 
 
-# limit cycles
+def test_a_slow_ramp_of_a_command_is_no_constant_force():
+    ramp = np.clip(np.arange(4000) / 1000.0 - 1.0, 0.0, 2.0)[:, np.newaxis] * (0.0, 1.0, 0.0)  # by 0.001 N a message
+    (times,) = np.nonzero(force_changes(ramp))
+    assert (len(times), times[0], times[-1]) == pytest.approx((193, 1009, 2996), abs=12)
 
 
 def sawtooth(phase: np.ndarray) -> np.ndarray:
@@ -129,8 +130,7 @@ def test_the_last_cycle_of_a_signal_without_noise_is_that_of_its_end():
     size = 1.0 + 2.0 * (time < 6.0) + 0.5 * (time < 9.0)  # the last cycle alone has the size 2
     sawtooth = 2.0 * size * ((time / 1.5) % 1.0 - 0.5) + 9.0
     last = last_cycle(time, sawtooth)
-    assert last.peak_to_peak == pytest.approx(2.0, rel=0.01)
-    assert last.period == pytest.approx(1.5, rel=0.01)
+    assert (last.peak_to_peak, last.period) == pytest.approx((2.0, 1.5), rel=0.01)
     assert math.isnan(last_cycle(time, time).period)
 
 
@@ -140,9 +140,6 @@ def test_the_last_cycle_of_a_signal_without_noise_is_that_of_its_end():
 ], ids=["noise", "creep", "constant", "random walk", "ringing", "step"])  # fmt: skip
 def test_what_does_not_repeat_is_no_cycle(value):
     assert limit_cycle(np.arange(5000) / 1000.0, value).confidence < 0.5
-
-
-# stick and slip
 
 
 def test_sticks_and_slips_are_told_apart_and_chatter_is_bridged():
@@ -168,9 +165,6 @@ def test_a_slow_sine_turns_and_does_not_slip_and_one_with_stiction_does(peak: fl
     assert len(runs(slips[0])) == 1
     assert np.mean(slips[0]) > 0.95
     assert len(runs(slips[1])) >= 12
-
-
-# friction
 
 
 def shaft(static: float, dynamic: float, viscous: float, inertia: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -251,8 +245,7 @@ def test_impacts_do_not_spoil_the_friction():
     time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
     torque[np.random.default_rng(9).integers(0, len(time), 60)] += 5.0
     found = identify_friction(time, velocity, torque, rest=0.1, window=0.002)
-    assert found.dynamic.value == near(0.18)
-    assert found.viscous.value == near(0.012)
+    assert [one.value for one in (found.dynamic, found.viscous)] == near([0.18, 0.012])
 
 
 @pytest.mark.parametrize("later", [1.0, 1.6])
@@ -264,9 +257,6 @@ def test_slow_samples_show_the_inertia_and_a_friction_that_changed_its_mean(late
     assert found.inertia.value == PRECISE(0.2, rel=0.002 if later == 1.0 else 0.1)
     assert abs(found.dynamic.value - 0.5 * (1.0 + later)) < 3.0 * found.dynamic.error
     assert found.unexplained > 0.1 * (later - 1.0)
-
-
-# stability
 
 
 def response(
@@ -288,9 +278,6 @@ def test_the_verdict_agrees_with_the_regimes(gamma, step, verdict):
     assert swings(0.05 * np.arange(len(error)), error, 0.16 * step, 0.08 * step).verdict is verdict
 
 
-# power
-
-
 def test_efficiency_is_work_out_over_work_in_both_ways():
     time = np.arange(10_000) / 1000.0
     motor = np.sin(time)
@@ -298,9 +285,6 @@ def test_efficiency_is_work_out_over_work_in_both_ways():
     (put, got), (put_back, got_back) = works(time, motor, joint), works(time, -joint, -motor)
     assert (got / put, got_back / put_back) == (near(0.93), near(0.8))
     assert put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
-
-
-# timing
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.04, 0.3])
@@ -313,9 +297,6 @@ def test_late_messages_are_not_counted_as_missing(jitter, lost):
     assert missed(stamp, usual_steps(np.diff(stamp))) == inner.sum()
     slower = np.append(stamp, stamp[-1] + 60_000_000 * np.arange(1, 400))
     assert 0.95 * inner.sum() <= missed(slower, usual_steps(np.diff(slower))) <= inner.sum()
-
-
-# swings
 
 
 @pytest.mark.parametrize(

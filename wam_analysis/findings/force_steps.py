@@ -10,7 +10,7 @@ from wam_analysis.findings.finding import Finding, Section, counted, shown, time
 from wam_analysis.findings.force import fate_words, response_findings
 from wam_analysis.findings.repetition import is_known
 from wam_analysis.foreign.sources import AXES, Source, jumps, pieces
-from wam_analysis.held_messages import row_at
+from wam_analysis.held_messages import force_changes, row_at
 from wam_analysis.measures.response import StepResponse, force_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings
@@ -63,8 +63,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     if not axes or not np.any(known):
         return []
     desired = np.column_stack([command.values[axis] for axis in axes])
-    changes = np.any(np.abs(np.diff(desired, axis=0)) > HOLD.equal_force, axis=1)
-    edges = np.flatnonzero([True, *changes, True])
+    edges = np.flatnonzero([True, *force_changes(desired), True])
     at = np.append(command.time, measured.time[-1])[edges]
     is_held = command.arrives[edges[:-1]] | (np.diff(at) >= HOLD.shortest)  # or else part of a ramp
     is_held[0] = True
