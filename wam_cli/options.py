@@ -94,7 +94,8 @@ def output_file(kind: str, suffixes: Sequence[str], heading: str = "") -> Callab
     ----------
     kind : what is written, as messages have it.
     suffixes : that it may have, in lower case.
-    heading : how those begin that this program wrote; others are not written over.  '' where any may be.
+    heading : what the first line of those has that this program wrote; others are not written over.  '' where any may
+        be.
     """
 
     def parse(text: str) -> Path:
@@ -111,9 +112,9 @@ def output_file(kind: str, suffixes: Sequence[str], heading: str = "") -> Callab
             why = f"no permission to write {'it' if file.exists() else f'into {folder}'}"
         if why:
             raise argparse.ArgumentTypeError(f"cannot write {file}: {why}; give another file")
-        if heading and file.exists():
-            there = file.read_text(encoding="utf-8", errors="replace")
-            if there.strip() and not there.startswith(heading):
+        if heading and file.is_file():  # a pipe has no end
+            there = file.read_text(encoding="utf-8", errors="replace").strip()
+            if there and heading not in there.partition("\n")[0]:
                 raise argparse.ArgumentTypeError(f"{file} exists, and this command did not write it; give a new file")
         return file
 
@@ -121,7 +122,6 @@ def output_file(kind: str, suffixes: Sequence[str], heading: str = "") -> Callab
 
 
 # '' is for devices and pipes, as /dev/stdout
-TABLE = output_file("a table", (".csv", ".tsv", ".txt", ".dat", ""))
 JSON = output_file("JSON", (".json", ".txt", ""))
 HTML = output_file("a page of HTML", (".html", ".htm", ""))
 PAGE = output_file("a page of the documentation", (".md",))

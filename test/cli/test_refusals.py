@@ -28,6 +28,7 @@ REFUSED = [
     ("evaluate figures --results file/in/x", "cannot write into file/in: file is no directory; give another"),
     ("evaluate figures --to file", "argument --to: cannot write into file: file is no directory"),
     ("sweep own.yaml --vary arm.payload=0,0.5", "ends in .csv, .tsv, .txt, .dat"),
+    ("sweep file --vary arm.payload=0,0.5", "file exists, and this command did not write it; give a new file"),
     ("analyse bag --json own.yaml", "own.yaml cannot be JSON; give a file that ends in .json, .txt"),
     ("identify bag --write own.yaml", "own.yaml exists, and this command did not write it; give a new file"),
     ("identify --excite own.yaml", "own.yaml exists, and this command did not write it; give a new file"),
@@ -75,9 +76,11 @@ def refused(words: str, capfd: pytest.CaptureFixture[str]) -> str:
 
 @pytest.mark.parametrize(("words", "reason"), REFUSED, ids=[words[:60] for words, _ in REFUSED])
 def test_it_is_refused_with_the_reason_and_nothing_is_written(
-    words: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    words: str, reason: str, tmp_path: Path, request: pytest.FixtureRequest, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
+    if words.startswith("up"):
+        request.getfixturevalue("domain_id")
+    request.getfixturevalue("monkeypatch").chdir(tmp_path)
     (tmp_path / "bags" / "here").mkdir(parents=True)
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "own.yaml").write_text(OWN)
@@ -86,15 +89,12 @@ def test_it_is_refused_with_the_reason_and_nothing_is_written(
     assert (tmp_path / "own.yaml").read_text() == OWN
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        "experiment creep --directory CLOSED/bags",
-        "bag record --set recorder:directory=CLOSED/bags",
-        "evaluate figures --results CLOSED/x",
-        "analyse bag --html CLOSED/x.html",
-    ],
-)
+@pytest.mark.parametrize("words", [
+    "experiment creep --directory CLOSED/bags",
+    "bag record --set recorder:directory=CLOSED/bags",
+    "evaluate figures --results CLOSED/x",
+    "analyse bag --html CLOSED/x.html",
+])  # fmt: skip
 def test_a_directory_without_permission_is_named(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -19,11 +19,11 @@ from wam_cli.options import (
     BASE_CONFIGURATION,
     PICTURE,
     SEED,
-    TABLE,
     batch_of,
     bounded,
     configuration_of,
     filled,
+    output_file,
     refuse_overridden,
     require_effect,
     require_option,
@@ -42,6 +42,7 @@ from wam_studies.thesis.measurement import MeasuredCase, measure, measure_scenar
 from wam_studies.thesis.rows import NOTHING, value_text
 
 SCENARIO = "demo_scenario"
+TABLE = output_file("a table", (".csv", ".tsv", ".txt", ".dat", ""), "failure,reported,deviating")  # see _table
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 PREDICTED_TOO = ", predicted"  # after the title of a quantity
 Runs = tuple[Callable[[Any], MeasuredCase], Sequence[Any], bool]  # what measures, the cases, and may results be kept
