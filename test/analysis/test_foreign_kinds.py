@@ -642,23 +642,22 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
         analyse(table | {"position.b [mm]": columns[1]}, lambda doing: None, given)
 
 
-@pytest.mark.parametrize(
-    ("text", "given", "message"),
-    [
-        ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
-        ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
-        ('"time", "position.a"\n0,1\n0.1, "ERR"\n', NOTHING, "'position.a': a cell has 'ERR', which is no number; lea"),
-        ("time,position.a\n0,1\n# end,\n", NOTHING, "'time': a cell has '# end', which is no number; .* dates are re"),
-        ("Date\t27\ntime\tposition.a\tvelocity.a\n0\t1\t2\n", NOTHING, "below 2 titles, its first line; remove"),
-        ('time,position.a,velocity.a,effort.a\n0,"1,2,3\n' + 2**15 * "1,1,2,3\n", NOTHING, "cell has '1,2,3', which"),
-        ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
-        ("time,position.a\n" + 2 * "".join(f"{i},1\n" for i in range(200)), NOTHING, "after 200 rows the time goes"),
-        ("time,position.a\n" + 40 * "".join(f"0.{i},1\n" for i in range(10, 70)), NOTHING, "after 60 rows the time"),
-        ("time,position,of\n" + "".join(f"{i // 3},{i},j{i % 3}\n" for i in range(90)), NOTHING, "each time, by 'of'"),
-        ("time,position.a\n0,1\n", topic_map([], [], ["/a"], [], []), "titles command.position.JOINT"),
-        ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
-    ],
-)
+@pytest.mark.parametrize(("text", "given", "message"), [
+    ("time,position.a\n0,01,1,5\n0,02,1,6\n", NOTHING, "a row of 4 cells below 2 titles"),
+    ("time,position.a,position.a\n0,1,2\n", NOTHING, "has two columns 'position.a'"),
+    ('"time", "position.a"\n0,1\n0.1, "ERR"\n', NOTHING, "'position.a': a cell has 'ERR', which is no number; lea"),
+    ("time,position.a\n0,1\n# end,\n", NOTHING, "'time': a cell has '# end', which is no number; .* dates are re"),
+    ("Date\t27\ntime\tposition.a\tvelocity.a\n0\t1\t2\n", NOTHING, "below 2 titles, its first line; remove"),
+    ('time,position.a,velocity.a,effort.a\n0,"1,2,3\n' + 2**15 * "1,1,2,3\n", NOTHING, "cell has '1,2,3', which"),
+    ("time,position.a\n3,1\n3,2\n", NOTHING, "the time is the same in all 2 rows"),
+    ("time,position.a\n" + 2 * "".join(f"{i},1\n" for i in range(200)), NOTHING, "after 200 rows the time goes"),
+    ("time,position.a\n" + 40 * "".join(f"0.{i},1\n" for i in range(10, 70)), NOTHING, "after 60 rows the time"),
+    ("time,position,of\n" + "".join(f"{i // 3},{i},j{i % 3}\n" for i in range(90)), NOTHING, "each time, by 'of'"),
+    ("time,position.a\n0,1\n", topic_map([], [], ["/a"], [], []), "titles command.position.JOINT"),
+    ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
+    ("time,q\n0,1\n", topic_map([], [], [], ["effort=q", "position=p"], []), "no column 'p'; .* position=.*: time"),
+    ("time,f\n0,1\n", topic_map([], [], [], ["force=f"], []), "no column 'f.x'; name that of force .*: time, f"),
+])  # fmt: skip
 def test_a_table_that_cannot_be_read_as_it_is_meant_is_refused(
     text: str, given: Any, message: str, tmp_path: Path
 ) -> None:

@@ -98,26 +98,30 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     Raises
     ------
     BagError
-        if it has no time, nothing that can be analysed, or a title twice.
+        if it has no time, no column that is named, nothing that can be analysed, or a title twice.
     ValueError
-        if a topic is given, or a joint that it has not.
+        if a topic or a field of names is given, or a joint that it has not.
     """
-    if given.topics or given.commands:
-        raise ValueError(f"{path} is a table and has no topics: leave out --topic and --command. {COMMANDS}")
+    if given.topics or given.commands or "name" in given.fields:
+        raise ValueError(f"{path} is a table: leave out --topic, --command and --map name. {COMMANDS}")
     _require_once(path, [*map(str, series)])
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     found |= {quantity: [one for one in found[quantity] if one.name in tuple("xyz")] for quantity in WRENCH}
-    every = [one for columns in found.values() for one in columns]
+    found["stamp"] = [one for one in found["stamp"] if not one.name]
     title = given.fields.get("stamp", "time")
+    for quantity, wanted in {"stamp": title, **given.fields}.items():
+        if not found[quantity]:
+            raise BagError(
+                f"{path} has no column '{wanted}{'.x' * (quantity in WRENCH)}'; name that of {quantity} with "
+                f"--map {quantity}=COLUMN: {', '.join(map(str, series))}"
+            )
+    every = [one for columns in found.values() for one in columns]
     used = {one.title for one in every} | {"index", *title.split(",")}  # a data frame has an index
     for quantity in (*JOINT_FIELDS, *WRENCH):
         if any(one.has_unit for one in found[quantity]):
             units[quantity] = found[quantity][0][:2]
-    clock = next((one for one in found["stamp"] if not one.name), None)
-    if clock is None:
-        columns = ", ".join(map(str, series))
-        raise BagError(f"{path} has no column '{title}'; name that of the time with --map stamp=COLUMN: {columns}")
+    clock = found["stamp"][0]
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
     _require_one_run(path, times, series)
