@@ -76,7 +76,7 @@ def output_check(node: str, topic: Topic, defect_of: Callable[[Any], str] = lamb
     kind = _KINDS[topic.type]
 
     def check(value: Any) -> Any:
-        defect = "" if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
+        defect = "" if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; give one"
         try:
             if not defect and not (
                 defect := defect_of(taken := kind(*map(_as_taken, repeat(kind), kind._fields, value)))
@@ -100,13 +100,13 @@ _NO_NUMBERS = (bool, np.bool_, np.character, np.complexfloating)
 
 def _float(name: str, value: Any) -> float:
     if isinstance(value, _NO_NUMBERS) or not hasattr(value, "__float__"):
-        raise TypeError(f"{name} has {value!r}; return floats")
+        raise TypeError(f"{name} has {value!r}; give floats")
     return float(value)
 
 
 def _listed(name: str, values: Any, of: str = "floats") -> Iterable[Any]:
     if isinstance(values, (str, bytes, bytearray, memoryview, Set, Mapping)) or not isinstance(values, Iterable):
-        raise TypeError(f"{name} is {values!r}; return a list of {of}")
+        raise TypeError(f"{name} is {values!r}; give a list of {of}")
     return values
 
 
@@ -114,7 +114,7 @@ def _as_taken(kind: Any, name: str, value: Any) -> Any:
     """A field of a message of a kind: a frame, the rows of a table, or numbers."""
     if name == "frame":
         if not isinstance(value, str):
-            raise TypeError(f"frame is {value!r}; return a text")
+            raise TypeError(f"frame is {value!r}; give a text")
         return value
     if name == "rows":
         return tuple(tuple(_floats("a row", row)) for row in _listed(name, value, "rows"))

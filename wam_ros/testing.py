@@ -21,6 +21,7 @@ from rclpy.publisher import Publisher
 from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
+from wam_description.defects import UnusableOutput, defect_finder, output_check
 from wam_description.interface import Interface, declared, is_packaged, require_parameters
 from wam_description.parameters import ParameterError, dotted, meant, require
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
@@ -32,7 +33,7 @@ from wam_ros.limits import TEST_LIMITS
 from wam_ros.messages import Refused, message_type
 from wam_ros.network import Place, is_inhabited
 from wam_ros.ros_topics import NAMESPACE, SECOND, listening, topic_name
-from wam_ros.wire import decoder, deserialized, requirement, stamp_in
+from wam_ros.wire import decoder, deserialized, stamp_in
 
 _EMPTY: Final[Mapping[str, Any]] = {
     JOINT_STATE: State([], [], []),
@@ -84,7 +85,8 @@ class Recorded(Mapping[str, Any]):
 
     def __getitem__(self, topic: str) -> Any:
         if not (data := self.data.get(topic)):
-            near, there = meant(topic, self.data) if topic not in self.data else "", ", ".join(self) or "none"
+            there = ", ".join(self) or "none"
+            near = "" if topic in self.data else meant(topic.removeprefix(f"/{NAMESPACE}/"), self.data)
             raise KeyError(f"nothing was recorded on '{topic}' so far; {near}topics with messages: {there}")
         return self._columns(topic, len(data))
 
@@ -248,7 +250,7 @@ class RunningArm:
         self._require_start()
         period = self.configuration.shared.timing.outer_period_ns
         limit = self.stamp + seconds * SECOND if self._driver else math.inf
-        end = time.monotonic() + TEST_LIMITS.patience
+        begin = running = time.monotonic()
         looked, looked_at = -period, 0.0
         while True:
             stamp = self.stamp if self._driver else 0
@@ -258,8 +260,11 @@ class RunningArm:
                 if condition():
                     return
                 look()
-                if stamp > limit or now > end:
-                    waited = f"{seconds:g} s of the arm's time" if stamp > limit else f"{TEST_LIMITS.patience:g} s"
+                is_paused = getattr(self.nodes.get("driver"), "is_paused", False)
+                running = running if is_paused else now
+                if stamp > limit or now - begin > TEST_LIMITS.patience or now - running > TEST_LIMITS.lockstep_timeout:
+                    waited = f"{seconds:g} s of the arm's time" if stamp > limit else f"{now - begin:.0f} s"
+                    waited += "; the arm is paused, call driver/pause with False" * is_paused
                     q = self.newest("joint_states")
                     at = f"at {stamp / SECOND:.3f} s joint_states is {q and [round(x, 4) for x in q.position]}"
                     raise AssertionError(f"not met within {waited}: {what or _source(condition)}; {at}")
@@ -280,7 +285,7 @@ class RunningArm:
 
     def run_until_refused(self, topic: str, seconds: float = TEST_LIMITS.arm_time) -> str:
         """Spin until a node refuses a message of a topic, which the test expects; returns the node and its reason."""
-        self._expected.add(topic)
+        self._expected.add(self._row(topic).name)
         self._spin(lambda: topic in self._refusals(), seconds, self._look, f"that a node refuses {topic}")
         return self._refusals()[topic]
 
@@ -314,11 +319,11 @@ class RunningArm:
             where there is no such service, with a switch or without.
         """
         self._require_start()
-        kind = f"std_srvs/srv/{'Trigger' if switch is None else 'SetBool'}"
+        kind, taken = ("Trigger", "no value") if switch is None else ("SetBool", "True or False")
         found = self.node.get_service_names_and_types()
-        there = [name.removeprefix(f"/{NAMESPACE}/") for name, kinds in found if kind in kinds]
+        there = [name.removeprefix(f"/{NAMESPACE}/") for name, kinds in found if f"std_srvs/srv/{kind}" in kinds]
         if service not in there:
-            raise ValueError(f"no {kind} is named '{service}'; there are {', '.join(there)}")
+            raise ValueError(f"no service that takes {taken} is named '{service}'; there are {', '.join(there)}")
         node, _, name = service.partition("/")
         client, message = self._client.service(Call(node, name, switch))
         self.run_until(client.service_is_ready)
@@ -353,20 +358,31 @@ class RunningArm:
         Raises
         ------
         ValueError
-            where there is no such topic, or the value has a wrong shape and no node takes the topic.
+            where there is no such topic, the time is negative, no message can have the value, or it is unusable and no
+            node takes the topic.
         """
+        require(seconds >= 0.0, f"seconds is {seconds:g}; give the time in which {topic} is sent again, 0 for once")
+        made, row = self.value(topic, **fields), self._row(topic)
         self.publisher(topic)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
         stamp = stamp_in(states[-1]) if states else 0
-        value = self.value(topic, **fields) if value is None else value
-        if not self.interface.subscribers(topic):
-            requirement(self._row(topic), self.configuration.shared, ANY)(value)
+        defect_of = defect_finder(row, self.configuration.shared.arm, ANY)
+        check = output_check("test", row, *[defect_of] * (not self.interface.subscribers(topic)))
+        try:
+            value = check(made if value is None else value)
+            self._client.send(topic, stamp, value)
+        except UnusableOutput as reason:
+            raise ValueError(reason.what) from None
+        except struct.error:  # a vector or a row of another length
+            raise ValueError(f"unusable {topic}: {defect_of(value)}") from None
         self._streams[topic] = stamp + round(seconds * SECOND), value
-        self._stream(stamp, topic)
 
     def value(self, topic: str, **fields: Any) -> Any:
         """A value of a topic; what is not given is empty or zero."""
-        empty = _EMPTY[self._row(topic).type]
+        kind = self._row(topic).type
+        others = f"publish it with a node of your own, see add; send takes {', '.join(_EMPTY)}"
+        require(kind in _EMPTY, f"'{topic}' is a {kind}; {others}")
+        empty = _EMPTY[kind]
         if unknown := fields.keys() - set(empty._fields):
             raise ValueError(f"'{topic}' has no field '{min(unknown)}'; it has {', '.join(empty._fields)}")
         return empty._replace(**fields)
@@ -386,15 +402,12 @@ class RunningArm:
         self.run_until(lambda: publisher.get_subscription_count() >= takers)
         return publisher
 
-    def _stream(self, stamp: int, only: str = "") -> None:
+    def _stream(self, stamp: int) -> None:
         for topic, (end, value) in list(self._streams.items()):
-            if only in ("", topic):
-                try:
-                    self._client.send(topic, stamp, value)
-                except struct.error as error:
-                    raise ValueError(f"{topic} cannot have {value}: {error}") from None
-            if stamp >= end:
+            if stamp > end:
                 self._streams.pop(topic)
+            else:
+                self._client.send(topic, stamp, value)
 
     def play(self, steps: Sequence[Mapping[str, Any]] = (), **start: Any) -> Bag:
         """Play a scenario from start to end, recorded; the same steps give the same numbers, bit for bit.
@@ -477,18 +490,19 @@ def configured(
 
 
 def playing(steps: Sequence[Mapping[str, Any]], folder: Path, *own: Any, **start: Any) -> Configuration:
-    """`configured` with a scenario of these steps and a recorder, whose bag is ``folder/bag``."""
+    """`configured` with a scenario of these steps and a recorder, whose bag is ``folder/bag``, or bag1 next to it."""
     script = folder / "script.yaml"
     try:
         script.write_text(yaml.safe_dump({"steps": list(steps)}), encoding="utf-8")
     except yaml.YAMLError as error:
         raise ParameterError(f"the steps contain {error.args[1]!r}; give mappings as a scenario file has") from None
-    recorder = {"directory": str(folder), "name": "bag", **start.pop("recorder", {})}
+    name = f"bag{len([*folder.glob('bag*')]) or ''}"
+    recorder = {"directory": str(folder), "name": name, **start.pop("recorder", {})}
     return configured("scenario", "recorder", *own, scenario={"script": str(script)}, recorder=recorder, **start)
 
 
 def _is_node(value: Any) -> bool:
-    return isinstance(value, type) or (isinstance(value, str) and ":" in value)
+    return hasattr(value, "parameters") or isinstance(value, type) or (isinstance(value, str) and ":" in value)
 
 
 def _entry(node: Any) -> str:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from wam_description.parameters import Nothing, ParameterError, parameter
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, JOINT_STATE, TASK_COLUMNS, Topic
 from wam_description.wiring import Input, Inputs, Outputs, reaction
+from wam_ros.limits import TEST_LIMITS
 from wam_ros.network import is_inhabited, requested_domain
 from wam_ros.testing import ArmFault, RunningArm, configured
 from wam_ros.wire import encoder
@@ -101,16 +102,21 @@ def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningAr
     common, at, of = np.intersect1d(states.stamp_ns, efforts.stamp_ns, return_indices=True)
     assert len(common) > 10
     np.testing.assert_array_equal(efforts.effort[of], -2.0 * states.velocity[at])
-    for name, reason in (
-        ("joint_posture_comand", "did you mean 'joint_posture_command'"),
-        ("joint_posture_command", "send 4"),
+    for name, given, reason in (
+        ("joint_posture_comand", {"position": [0.0, 0.0]}, "did you mean 'joint_posture_command'"),
+        ("joint_posture_command", {"position": [0.0, 0.0]}, "send 4"),  # which no node takes here
+        ("joint_posture_command", {"positions": [0.0]}, "no field 'positions'; it has position, velocity, effort"),
+        ("joint_posture_command", {"position": 0.3}, "unusable .*: position is 0.3; give a list of floats"),
+        ("joint_posture_command", {"seconds": -1.0}, "seconds is -1; give the time"),
+        ("joint_trajectory", {}, "is a trajectory_msgs/msg/JointTrajectory; publish it with a node .*JointState, "),
+        ("sim/disturbance", {"force": (0.0, 5.0)}, "unusable sim/disturbance: .*; send three numbers for each"),
     ):
-        with pytest.raises(ValueError, match=reason):  # which no node takes here
-            arm.send(name, position=[0.0, 0.0])
+        with pytest.raises(ValueError, match=reason):
+            arm.send(name, **given)
     with pytest.raises(ValueError, match="no node 'forceloop' in this test; it has driver, "):
         arm.status("forceloop")
-    with pytest.raises(ValueError, match="no field 'positions'; it has position, velocity, effort"):
-        arm.send("joint_posture_command", positions=[0.0])
+    with pytest.raises(ValueError, match="did you mean 'force_command'"):
+        arm.run_until_refused("force_comand")
 
 
 def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
@@ -122,20 +128,18 @@ def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
     sent = arm.recorded["joint_velocity_command"].stamp_ns
     assert sent[-1] - sent[0] == 500_000_000
     assert abs(arm.truth.qd[2]) < 0.01
-    with pytest.raises(KeyError, match=r"nothing was recorded on 'force_command' so far; .*joint_states"):
-        arm.recorded["force_command"]
+    for topic, reason in (("force_command", ".*joint_states"), ("/wam/joint_states", "did you mean 'joint_states'")):
+        with pytest.raises(KeyError, match=f"nothing was recorded on '{topic}' so far; {reason}"):
+            arm.recorded[topic]
 
 
-@pytest.mark.parametrize(
-    ("taker", "topic", "stamp", "text", "fields"),
-    [
-        ("transform", "joint_velocity_command", 0, "no stamp", {"velocity": [0.1] * 4}),
-        ("transform", "joint_velocity_command", 1, "1.0. s older .*allowed: 0.035 s", {"velocity": [0.0] * 4}),
-        ("transform", "joint_velocity_command", 10**12, "999 s ahead .*allowed: 0.035 s", {"velocity": [0.0] * 4}),
-        ("force_loop", "joint_posture_command", 1, "allowed: 0.2 s", {"position": [0.0, -0.6, 0.0, 0.5]}),
-        ("force_loop", "task_command", 1, "1000 rows; send at most 4", {"rows": ((0.0,) * len(TASK_COLUMNS),) * 1000}),
-    ],
-)
+@pytest.mark.parametrize(("taker", "topic", "stamp", "text", "fields"), [
+    ("transform", "joint_velocity_command", 0, "no stamp", {"velocity": [0.1] * 4}),
+    ("transform", "joint_velocity_command", 1, "1.0. s older .*allowed: 0.035 s", {"velocity": [0.0] * 4}),
+    ("transform", "joint_velocity_command", 10**12, "999 s ahead .*allowed: 0.035 s", {"velocity": [0.0] * 4}),
+    ("force_loop", "joint_posture_command", 1, "allowed: 0.2 s", {"position": [0.0, -0.6, 0.0, 0.5]}),
+    ("force_loop", "task_command", 1, "1000 rows; send at most 4", {"rows": ((0.0,) * len(TASK_COLUMNS),) * 1000}),
+])  # fmt: skip
 def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_takes_its_topic(
     taker: str, topic: str, stamp: int, text: str, fields: dict[str, Any], arm: RunningArm
 ) -> None:
@@ -187,7 +191,8 @@ def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
 def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     arm.enable()
     for words in (("driver/estp",), ("estop",), ("driver/estop", True), ("driver/enable",)):
-        with pytest.raises(ValueError, match=f"is named '{words[0]}'; there are .*driver/"):
+        takes = "True or False" if words[1:] else "no value"
+        with pytest.raises(ValueError, match=f"takes {takes} is named '{words[0]}'; there are .*driver/"):
             arm.call(*words)
     assert arm.call("driver/estop").success
     with pytest.raises(ArmFault, match="emergency stop"):
@@ -209,38 +214,39 @@ def test_a_number_that_is_none_is_an_exception_though_no_node_takes_it(arm: Runn
     arm.run(0.1)
 
 
-@pytest.mark.parametrize(
-    ("node", "text"),
-    [
-        (Raising, "raising: unexpected ZeroDivisionError"),
-        (Silent, "silent: unusable output of step: None; return a dictionary from topic to value"),
-    ],
-)
+@pytest.mark.parametrize(("node", "text"), [
+    (Raising, "raising: unexpected ZeroDivisionError"),
+    (Silent, "silent: unusable output of step: None; return a dictionary from topic to value"),
+])  # fmt: skip
 def test_a_node_that_fails_is_named(node: type, text: str, arm: RunningArm) -> None:
     arm.start(force_loop=node)
     assert arm.run_until_fault().startswith(text)
 
 
-def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) -> None:
+def test_a_condition_that_does_not_come_fails(arm: RunningArm, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(AssertionError, match=r"0\.1 s of .*: arm\.run_until.* \(test_kit\.py:\d+\).* is \[0\.0, -0"):
         arm.run_until(lambda: False, 0.1)
     with pytest.raises(AssertionError, match=r"0\.1 s of .*: a fault of the driver; "):
         arm.run_until_fault(0.1)
     with pytest.raises(AssertionError, match="does not go back by 1 s"):
         arm.run(-1.0)
+    monkeypatch.setattr("wam_ros.testing.TEST_LIMITS", replace(TEST_LIMITS, lockstep_timeout=0.3))
+    arm.call("driver/pause", True)
+    with pytest.raises(AssertionError, match=r"within 0 s; the arm is paused, call driver/pause with False: .*run"):
+        arm.run(0.1)
+    arm.call("driver/pause", False)
+    arm.run(0.1)
 
 
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ({"driver": {"watchdogg": 1.0}}, "did you mean"),
-        ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
-        ({"timing": {"period": -1.0}}, "period"),
-        ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you set.*damping.*gan"),
-        ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
-        ({"driver": {"sensors.encoder_noise": [0.0] * 9}}, "it needs 4"),  # by the node itself
-    ],
-)
+@pytest.mark.parametrize(("values", "text"), [
+    ({"driver": {"watchdogg": 1.0}}, "did you mean"),
+    ({"force_loop": Damping.__new__(Damping)}, "is no node; give its class, or 'module:Class'"),
+    ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
+    ({"timing": {"period": -1.0}}, "period"),
+    ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you set.*damping.*gan"),
+    ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
+    ({"driver": {"sensors.encoder_noise": [0.0] * 9}}, "it needs 4"),  # by the node itself
+])  # fmt: skip
 def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text: str, arm: RunningArm) -> None:
     with pytest.raises(ParameterError, match=text) as kept:
         arm.start(**values)
@@ -262,6 +268,7 @@ def test_a_scenario_that_fails_is_an_exception_and_so_are_steps_that_no_file_can
         arm.play([object()])  # type: ignore[list-item]
     with pytest.raises(ArmFault, match="driver refuses"):
         arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])
+    assert arm.play([{"name": "wait", "seconds": 0.1}]).path.name == "bag1"
 
 
 def test_nested_values_and_a_class_in_the_place_of_a_node_make_a_configuration() -> None:

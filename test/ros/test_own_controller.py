@@ -94,19 +94,16 @@ def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
     assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
 
 
-@pytest.mark.parametrize(
-    ("row", "text"),
-    [
-        (
-            Topic("echo", "sensor_msgs/JointState", "outer", "N m", "joints"),
-            "topic 'echo': type is 'sensor_msgs/JointState'; allowed: 'sensor_msgs/msg/JointState', ",
-        ),
-        (Topic("echo", JOINT_STATE, "200 Hz", "N m", "joints"), "topic 'echo': rate is '200 Hz'; allowed: 'inner', "),
-        (Topic("echo", JOINT_STATE, "outer", "N m"), "topic 'echo': side is ''; allowed: 'motors', 'joints'"),
-        (Topic("echo", WRENCH, "outer", "N", "joints"), "topic 'echo': side is 'joints'; allowed: ''"),
-        (Topic("echo", TABLE, "outer", "N"), "topic 'echo': columns are (); name its columns"),
-    ],
-)
+@pytest.mark.parametrize(("row", "text"), [
+    (
+        Topic("echo", "sensor_msgs/JointState", "outer", "N m", "joints"),
+        "topic 'echo': type is 'sensor_msgs/JointState'; allowed: 'sensor_msgs/msg/JointState', ",
+    ),
+    (Topic("echo", JOINT_STATE, "200 Hz", "N m", "joints"), "topic 'echo': rate is '200 Hz'; allowed: 'inner', "),
+    (Topic("echo", JOINT_STATE, "outer", "N m"), "topic 'echo': side is ''; allowed: 'motors', 'joints'"),
+    (Topic("echo", WRENCH, "outer", "N", "joints"), "topic 'echo': side is 'joints'; allowed: ''"),
+    (Topic("echo", TABLE, "outer", "N"), "topic 'echo': columns are (); name its columns"),
+])  # fmt: skip
 def test_a_topic_of_its_own_that_cannot_be_is_refused_with_what_is_allowed(
     row: Topic, text: str, configured: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,13 +227,10 @@ def test_nodes_that_do_not_fit_together_are_refused(
         Interface(shared, own)
 
 
-@pytest.mark.parametrize(
-    ("outputs", "text"),
-    [
-        (("echo",), "node 'echo' returned the topic 'ecko'; its reactions declare echo"),
-        ((), r"its reactions declare nothing; write outputs=\('ecko',\) in @reaction"),
-    ],
-)
+@pytest.mark.parametrize(("outputs", "text"), [
+    (("echo",), "node 'echo' returned the topic 'ecko'; its reactions declare echo"),
+    ((), r"its reactions declare nothing; write outputs=\('ecko',\) in @reaction"),
+])  # fmt: skip
 def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(
     outputs: tuple[str, ...], text: str, configured: Configuration, tmp_path: Path
 ) -> None:
@@ -317,18 +311,18 @@ UNUSABLE: list[tuple[str, Any, str]] = [
     (EFFORT, State([], [], [0.0, 0.0, 1e13, -1e13]), "effort of joint3 is 1e+13; no arm reaches that, send at most"),
     (EFFORT, State([], [], [0.0] * 3), "effort has 3 values; send 4, one for each of joint1, joint2, joint3, joint4"),
     (EFFORT, State([], [0.0] * 3, [0.0] * 4), "velocity has 3 values; send 4, one for each of joint1"),
-    (EFFORT, [0.0] * 4, "[0.0, 0.0, 0.0, 0.0] is no State; return one"),
+    (EFFORT, [0.0] * 4, "[0.0, 0.0, 0.0, 0.0] is no State; give one"),
     *(
         (EFFORT, State([], [], given), f"cannot be sent: effort {found}")  # type: ignore[arg-type]
         for given, found in (
-            (["a"] * 4, "has 'a'; return floats"),
-            (None, "is None; return a list of floats"),
-            ("1234", "is '1234'; return a list of floats"),
+            (["a"] * 4, "has 'a'; give floats"),
+            (None, "is None; give a list of floats"),
+            ("1234", "is '1234'; give a list of floats"),
         )
     ),
-    ("force_command", Wrench("base", {1.0, 2.0, 3.0}, (0.0,) * 3), "force is {1.0, 2.0, 3.0}; return a list"),  # type: ignore[arg-type]
-    ("force_command", Wrench(b"base", (0.0,) * 3, (0.0,) * 3), "frame is b'base'; return a text"),  # type: ignore[arg-type]
-    ("task_command", Table("base", {(1.0,)}), "rows is {(1.0,)}; return a list of rows"),  # type: ignore[arg-type]
+    ("force_command", Wrench("base", {1.0, 2.0, 3.0}, (0.0,) * 3), "force is {1.0, 2.0, 3.0}; give a list"),  # type: ignore[arg-type]
+    ("force_command", Wrench(b"base", (0.0,) * 3, (0.0,) * 3), "frame is b'base'; give a text"),  # type: ignore[arg-type]
+    ("task_command", Table("base", {(1.0,)}), "rows is {(1.0,)}; give a list of rows"),  # type: ignore[arg-type]
 ]
 
 
