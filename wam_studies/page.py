@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from wam_analysis.table import markdown
 from wam_studies.harness import Measurement
 from wam_studies.scores import rows_table
 
@@ -33,7 +34,7 @@ def report(measured: Measurement, command: str) -> str:
 
 
 def block(measured: Measurement, command: str, picture: str = "") -> str:
-    """What is written into a page: when and how it was measured, the picture, and what is required.
+    """What is written into a page: when and how it was measured, the picture, what is required, and a page's tables.
 
     All tables and each failed case are in `report`.
 
@@ -48,8 +49,8 @@ def block(measured: Measurement, command: str, picture: str = "") -> str:
     bounded = [row for row in measured.scores.rows if row.is_bounded]
     missed = sum(row.is_missed for row in bounded)
     verdict = f"Missed: {missed} of these required values." if missed else "Every required value is met."
-    table = rows_table(bounded)
-    return "\n\n".join(filter(None, [head, shown, verdict, table]))
+    tables = [markdown(one.head, one.rows) for one in measured.scores.tables if one.is_in_page]
+    return "\n\n".join(filter(None, [head, shown, verdict, rows_table(bounded).rstrip(), *tables]))
 
 
 def section_of(file: Path, name: str) -> str:

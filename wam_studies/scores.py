@@ -176,12 +176,13 @@ def named(rows: Iterable[Row], addition: str) -> Iterator[Row]:
 
 
 class ScoreTable(NamedTuple):
-    """A table of a page: its title, the cells of its head and rows, and what a reader has to know."""
+    """A table: its title, the cells of its head and rows, what a reader has to know, and whether pages have it."""
 
     title: str
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+    is_in_page: bool = False
 
     def text(self) -> str:
         """The table in Markdown, with its title."""

@@ -93,11 +93,12 @@ def test_escapes_are_counted_by_kind_and_each_is_listed() -> None:
     study = FaultStudy(CONFIGURATION)
     records = [trial("messages", "the arm moved"), trial("messages"), trial("losses")]
     scores = study.score(records)
-    assert {row.name: row.found.value for row in scores.rows} == {"escapes, messages": 1.0, "escapes, losses": 0.0}
-    assert scores.missed == ["escapes, messages: 1, required 0"]
-    assert scores.tables[0].head == ["quantity (observations)", "messages", "losses"]
-    worst = {line[0]: line[1:] for line in scores.tables[0].rows}
-    assert (worst["escapes"], worst["largest delay [ms]"]) == (["1 (2)", "0 (1)"], ["– (0)", "42 (1)"])
+    assert scores.missed == ["trials with an escape: 1, required 0"]
+    (table,) = scores.tables
+    assert table.rows == [
+        ["messages", "2", "20", "1", "0.002", "1.5", "–"],
+        ["losses", "1", "10", "0", "0.002", "1.5", "42"],
+    ]
     assert [study.failure(one) for one in records] == ["messages, a fault: the arm moved", "", ""]
 
 

@@ -1,19 +1,22 @@
 """Faults of every kind, each trial on nodes that are watched independently of what they report."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
+
+import numpy as np
 
 from wam_description.parameters import parameter
 from wam_studies.faults import losses, messages, parameter_sets
 from wam_studies.faults.trials import FaultCase, FaultTrial
 from wam_studies.harness import Study
-from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, grouped, named
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, grouped, number
 
 LOCKSTEP: Final = {"timing.mode": "lockstep"}
 # how many periods are late depends on what else the computer does; nothing here is about that
 REALTIME: Final = {"timing.mode": "realtime", "driver:late_periods": 1.0}
+
+WORST: Final = ("kind", "trials", "faults", "escapes", "motion [rad]", "force [N]", "delay [ms]")
 
 
 class FaultKind(NamedTuple):
@@ -68,8 +71,8 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
         for name in self.kinds:
             kind = KINDS[name]
             configuration = self.configuration.with_values(kind.values)
-            for number in range(self.trials or kind.full):
-                yield FaultCase(configuration, name, seed, number)
+            for i in range(self.trials or kind.full):
+                yield FaultCase(configuration, name, seed, i)
 
     def own_values(self, case: FaultCase) -> Mapping[str, Any]:
         """Parameters that the kind of fault sets."""
@@ -80,16 +83,15 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
         return f"{record.kind}, {record.name}: {'; '.join(record.escapes)}" if record.escapes else ""
 
     def score(self, records: Sequence[FaultTrial]) -> Scores:
-        """Trials of each kind from which something escaped, and the worst values."""
-        by_kind = grouped(records, lambda one: one.kind)
-        rows = [row for name, own in by_kind.items() for row in named(list(_rows(own))[:1], name)]
-        return Scores(rows, [by_group("Worst values", by_kind, _rows)])
+        """Trials from which something escaped, and the worst values of each kind."""
+        worst = [_worst(kind, own) for kind, own in grouped(records, lambda one: one.kind).items()]
+        escapes = exact(sum(bool(one.escapes) for one in records), len(records))
+        table = ScoreTable("Worst values", WORST, worst, is_in_page=True)
+        return Scores([Row("trials with an escape", escapes, required=NONE_AT_ALL)], [table])
 
 
-def _rows(trials: Sequence[FaultTrial]) -> Iterator[Row]:
-    """What escaped from the trials of a kind, and their largest values."""
-    yield Row("escapes", exact(sum(bool(one.escapes) for one in trials), len(trials)), required=NONE_AT_ALL)
-    yield Row("messages, sets, nodes and so on", exact(sum(one.size for one in trials), len(trials)))
-    for name, unit, scale in (("motion", "rad", 1.0), ("force", "N", 1.0), ("delay", "ms", 1e3)):
-        known = [value for one in trials if not math.isnan(value := getattr(one, name))]
-        yield Row(f"largest {name}", exact(max(known, default=math.nan), len(known)), unit, scale)
+def _worst(kind: str, trials: Sequence[FaultTrial]) -> list[str]:
+    """The cells of a kind under `WORST`."""
+    counts = len(trials), sum(one.size for one in trials), sum(bool(one.escapes) for one in trials)
+    motion, force, delay = np.fmax.reduce([(one.motion, one.force, one.delay) for one in trials]).tolist()
+    return [kind, *map(str, counts), number(motion, 1.0), number(force, 1.0), number(delay, 1e3)]
