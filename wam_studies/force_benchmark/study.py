@@ -194,7 +194,8 @@ def _controllers(trials: Sequence[ForceTrial]) -> Iterator[ScoreTable]:
             for name, result in {FORCE_LOOP: trial.result, **trial.others}.items() if trial.others else ():
                 results.setdefault(name, []).append(result)
         if results:
-            yield by_group(f"Other controllers, {feedback}", results, _results, note)
+            table = by_group(f"Other controllers, {feedback}", results, _results, note)
+            yield table._replace(is_in_page=feedback == SENSORS)
 
 
 def _results(results: Sequence[TaskResult]) -> Iterator[Row]:
