@@ -226,9 +226,6 @@ def test_what_was_planted_is_found_within_two_percent(plant: Any, tmp_path: Path
     assert {name: numbers.get(name) for name in planted} == pytest.approx(planted, rel=CLOSE)
 
 
-# quiet ones
-
-
 def resting(path: Path) -> Made:
     time = times(20.0)
     return by_mcap_ros2(path, joints("/joint_states", time, PANDA, position=at_rest(time, PANDA, 20))), TopicMap()
@@ -511,9 +508,6 @@ def test_a_step_ends_where_command_or_force_goes_over_to_another_frame(
     assert numbers[f"{name}: rise time 10-90 %"] == pytest.approx(math.log(9.0) * 0.2, rel=0.01)
     assert numbers[f"{name}: force in the steady state"] == pytest.approx(10.0, abs=1e-3)
     assert numbers[f"{name}: overshoot"] == pytest.approx(0.0, abs=0.1)
-
-
-# ways in
 
 
 @pytest.mark.slow

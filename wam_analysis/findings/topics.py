@@ -36,6 +36,11 @@ def topics_section(recording: AnalysedRecording) -> Section:
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
+    sentences += [
+        f"{one.topic} changes to the frame {one.frame} at {one.time[one.arrives][0]:.1f} s."
+        for one in found
+        if np.any(one.arrives) and not one.is_command
+    ]
     if computed := [one.label for one in found if _lacks_velocity(one)]:
         sentences.append(f"The velocity is computed from the position: {', '.join(computed)}.")
     sentences += [*wrong, *_alike(found), *unread(bag)]
