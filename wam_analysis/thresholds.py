@@ -107,10 +107,8 @@ class CycleThresholds:
     apart: int = 4  # times higher or lower frequencies, between which a line is reported if it is the strongest
     clear_line: float = 0.01  # of the largest line: smaller ones are not reported
     # steps
-    halvings: int = 4  # of an end until it is steady, at most
-    one_way: float = (
-        0.8  # of the range of its parts, which lies between the first and the last one where it still moves
-    )
+    halvings: int = 4  # of an end until it is steady, at most; its means are those of twice as many parts
+    one_way: float = 0.8  # of the range of these means, by which the last is off the first where the end still moves
     at_end: float = 0.2  # of the settling band: a smaller motion is none
     # part of the settling band that noise may fill after smoothing, four standard deviations of it
     step_quiet: float = 0.1

@@ -50,7 +50,7 @@ def block(measured: Measurement, command: str, picture: str = "") -> str:
     missed = sum(row.is_missed for row in bounded)
     verdict = f"Missed: {missed} of these required values." if missed else "Every required value is met."
     tables = [markdown(one.head, one.rows) for one in measured.scores.tables if one.is_in_page]
-    return "\n\n".join(filter(None, [head, shown, verdict, rows_table(bounded).rstrip(), *tables]))
+    return "\n\n".join(part.rstrip() for part in (head, shown, verdict, rows_table(bounded), *tables) if part)
 
 
 def section_of(file: Path, name: str) -> str:

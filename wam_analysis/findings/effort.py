@@ -164,12 +164,8 @@ def friction(source: Source) -> tuple[Friction, float]:
         fit = partial(fit, use=use)
         found, shift = _best(fit, most, shift)
     if shift:  # known to a sample
-        sides = fit(shift - 1), fit(shift + 1)
-        found = found._replace(
-            dynamic=_between(found.dynamic, *(one.dynamic for one in sides)),
-            viscous=_between(found.viscous, *(one.viscous for one in sides)),
-            inertia=_between(found.inertia, *(one.inertia for one in sides)),
-        )
+        dynamic, viscous, inertia = map(_between, found[1:4], fit(shift - 1)[1:4], fit(shift + 1)[1:4])
+        found = found._replace(dynamic=dynamic, viscous=viscous, inertia=inertia)
     doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
     inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
     return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_analysis.thresholds import LAYOUT, SHAFT
+from wam_bag.arrays import Numbers
 
 
 class Finding(NamedTuple):
@@ -109,6 +110,11 @@ def shown(value: float, unit: str = "") -> str:
 def titled(quantity: str, unit: str) -> str:
     """A quantity with its unit, '' for a pure number."""
     return f"{quantity} [{unit}]" if unit else quantity
+
+
+def when(at: Numbers) -> str:
+    """Some times, s, in words."""
+    return f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
 
 
 def stated(text: str) -> str:

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.effort import limited
-from wam_analysis.findings.finding import Finding, Section, counted, shown, times
+from wam_analysis.findings.finding import Finding, Section, counted, shown, when
 from wam_analysis.findings.force import fate_words, response_findings
 from wam_analysis.findings.repetition import is_known
+from wam_analysis.findings.topics import frame_change
 from wam_analysis.foreign.sources import AXES, Source, jumps, pieces
 from wam_analysis.held_messages import force_changes, row_at
 from wam_analysis.measures.response import StepResponse, force_response
@@ -16,7 +17,6 @@ from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, SHAFT, STREAM
-from wam_bag.arrays import Numbers
 from wam_theory.verdicts import Verdict
 
 FORCE = AXES[:3]
@@ -174,22 +174,13 @@ def _tared(measured: Source, command: Source | None) -> str:
         return ""
     size = shown(float(np.max(np.linalg.norm(moves[:, rows], axis=0))), "N")
     return (
-        f"{measured.label}: the force jumps from one message to the next {_when(force.time[rows])}, by up to {size}, "
+        f"{measured.label}: the force jumps from one message to the next {when(force.time[rows])}, by up to {size}, "
         "as by a tare or an impact."
     )
 
 
 def _arrival(command: Source) -> str:
     """That a command goes over to its frame from another one, '' if it does not."""
-    at = command.time[command.arrives & np.any(np.column_stack([*command.values.values()]), axis=1)]
-    if not len(at):
-        return ""
-    return (
-        f"{command.topic} changes to the frame {command.frame or 'without a name'} {_when(at)}; that is not evaluated "
-        "as a step, because what was commanded before is in another frame."
-    )
-
-
-def _when(at: Numbers) -> str:
-    """Some times, s, in words."""
-    return f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
+    change = frame_change(command)
+    reason = "that is not evaluated as a step, because what was commanded before is in another frame"
+    return f"{change}; {reason}." if change else ""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_analysis.findings.finding import Section, counted, shown, times
+from wam_analysis.findings.finding import Section, counted, shown, times, when
 from wam_analysis.foreign.sources import Source, Treated, clocks_of, pieces
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
@@ -36,15 +36,17 @@ def topics_section(recording: AnalysedRecording) -> Section:
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
-    sentences += [
-        f"{one.topic} changes to the frame {one.frame} at {one.time[one.arrives][0]:.1f} s."
-        for one in found
-        if np.any(one.arrives) and not one.is_command
-    ]
+    sentences += [f"{text}." for one in found if not (one.is_command or one.is_joint) and (text := frame_change(one))]
     if computed := [one.label for one in found if _lacks_velocity(one)]:
         sentences.append(f"The velocity is computed from the position: {', '.join(computed)}.")
     sentences += [*wrong, *_alike(found), *unread(bag)]
     return Section("happened", "What happened", sentences, wrong=wrong)
+
+
+def frame_change(source: Source) -> str:
+    """That a wrench which is not zero goes over to its frame from another one, '' if it does not."""
+    at = source.time[source.arrives & np.any(np.column_stack([*source.values.values()]), axis=1)]
+    return f"{source.topic} changes to the frame {source.frame or 'without a name'} {when(at)}" if len(at) else ""
 
 
 def _topic(name: str, columns: Columns) -> Iterator[str]:

@@ -57,9 +57,9 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
             is_shape = CYCLE.slowest_cycles * (last - first) < np.max(longest[first:last] % n)  # of a slower one
             goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-            changing = None if better else _changing(time[inner], flat[inner], cycle.period)
+            changing = None if better or is_shape else _changing(time[inner], flat[inner], cycle.period)
             if is_shape or goes_on or changing:
-                if changing and changing.growth > 1.0 and changing.cycles >= CYCLE.episode_cycles and not is_shape:
+                if changing and changing.growth > 1.0 and changing.cycles >= CYCLE.episode_cycles:
                     found.append(Episode(float(time[first]), float(time[last - 1]), changing))
                 transients.append(_Transient(first, last, cycle.period, _width(time, cycle.period)))
                 lag = 0.0  # its last part is no limit cycle

@@ -77,7 +77,7 @@ def step_response(
 
 
 def _end(tail: Numbers, begin: float, band: float) -> tuple[Numbers, bool]:
-    """The part of an end that does not move one way by much of the band, else the last eighth; whether there is one."""
+    """The part of an end that does not move one way by much of the band, else its last part; whether there is one."""
     change, is_steady = abs(float(np.mean(tail)) - begin), True
     for _ in range(CYCLE.halvings):
         if len(tail) < 2 * CYCLE.halvings:

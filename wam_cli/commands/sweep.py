@@ -42,7 +42,8 @@ from wam_studies.thesis.measurement import MeasuredCase, measure, measure_scenar
 from wam_studies.thesis.rows import NOTHING, value_text
 
 SCENARIO = "demo_scenario"
-TABLE = output_file("a table", (".csv", ".tsv", ".txt", ".dat", ""), "failure,reported,deviating")  # see _table
+WORDED = "failure", "reported", "deviating"  # columns in words, between the values of a set and the quantities
+TABLE = output_file("a table", (".csv", ".tsv", ".txt", ".dat", ""), ",".join(WORDED))
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 PREDICTED_TOO = ", predicted"  # after the title of a quantity
 Runs = tuple[Callable[[Any], MeasuredCase], Sequence[Any], bool]  # what measures, the cases, and may results be kept
@@ -181,7 +182,8 @@ def _table(sets: Sequence[Values], found: Sequence[MeasuredCase]) -> tuple[list[
     rows, titles = [], dict[str, None]()
     for values, (failure, result) in zip(sets, found, strict=True):
         deviating = [one.quantity for one in result.rows if not one.agrees]
-        row = {**values, "failure": failure, "reported": "; ".join(result.reported), "deviating": "; ".join(deviating)}
+        worded = failure, "; ".join(result.reported), "; ".join(deviating)
+        row = {**values, **dict(zip(WORDED, worded, strict=True))}
         for one in result.rows:
             known = {one.title: one.measured, one.title + PREDICTED_TOO: one.predicted}
             row |= {title: value for title, value in known.items() if value_text(value) != NOTHING}
