@@ -47,12 +47,12 @@ def held_rows(stamps: Times, base: Times, held: int = STREAM.held) -> tuple[Inde
     return row, (age >= 0) & (age <= held_for(stamps, held))
 
 
-def force_changes(forces: Numbers) -> Mask:
-    """(n - 1,), whether each force but the first, (n, k) N, differs from that since the last change: also in a ramp."""
-    found, since = np.zeros(max(len(forces) - 1, 0), np.bool_), forces[:1]
-    for row in np.flatnonzero(np.any(np.diff(forces, axis=0) != 0.0, axis=1)).tolist():
-        if np.any(np.abs(forces[row + 1] - since) > HOLD.equal_force):
-            found[row], since = True, forces[row + 1]
+def value_changes(values: Numbers, least: float = HOLD.equal_force) -> Mask:
+    """(n - 1,), whether each command but the first, (n, k), differs from that since the last change: also in a ramp."""
+    found, since = np.zeros(max(len(values) - 1, 0), np.bool_), values[:1]
+    for row in np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1)).tolist():
+        if np.any(np.abs(values[row + 1] - since) > least):
+            found[row], since = True, values[row + 1]
     return found
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import force_changes, held_of, intervals, step_at
+from wam_analysis.held_messages import held_of, intervals, step_at, value_changes
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers, Times
 from wam_control.force.contact_place import pinned_position
@@ -128,7 +128,7 @@ def _commanded(run: RecordedRun) -> Iterator[Hold]:
     if commands is None:
         return
     frames = np.array(commands.frames)
-    changed = force_changes(commands.force) | (frames[1:] != frames[:-1])
+    changed = value_changes(commands.force) | (frames[1:] != frames[:-1])
     for row, begin, end in intervals(commands.stamp_ns, changed, held_of(run, "force_command")):
         force, torque = (each[row] for each in (commands.force, commands.torque))
         command = ForceCommand(str(frames[row]), tuple(force.tolist()), tuple(torque.tolist()))

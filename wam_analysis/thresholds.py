@@ -106,6 +106,11 @@ class CycleThresholds:
     sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
     apart: int = 4  # times higher or lower frequencies, between which a line is reported if it is the strongest
     clear_line: float = 0.01  # of the largest line: smaller ones are not reported
+    # a signal that follows a command
+    compared: int = 4000  # samples at most
+    longest_delay: float = 0.5  # s
+    delays: int = 101  # of a search, to both sides
+    sections: int = 10  # golden ones, until a play is known to 1 % of what it may be
     # steps
     halvings: int = 4  # of an end until it is steady, at most; its means are those of twice as many parts
     one_way: float = 0.8  # of the range of these means, by which the last is off the first where the end still moves

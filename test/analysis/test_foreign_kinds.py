@@ -13,6 +13,7 @@ import pytest
 from foreign_bags import CONTROLLER, INTERFACES, JOINTS, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
 
 from wam_analysis.findings.analysis import analyse
+from wam_analysis.foreign.reading import TRAJECTORY
 from wam_analysis.foreign.topic_map import topic_map
 from wam_bag.bag import BagError
 
@@ -232,10 +233,8 @@ def of_ros2_control() -> list[Case]:
             {"interface_names": ["effort", "position"], "values": [*s.fields["effort"], *s.fields["position"]]},
         ]}) for s in states
     ]  # fmt: skip
-    expected, followed = (
-        sine(0.7, 0.5) | FRICTION,
-        ("at the commanded frequency.", ", 1 joint.", "'messages': '3000 of 3000 "),
-    )
+    expected = sine(0.7, 0.5) | FRICTION
+    followed = ("at the commanded frequency.", ", 1 joint.", "'messages': '3000 of 3000 ")
     beside = interfaces + one("/joint_states", 50.0, 0.7, 0.5)
     return [
         Case("new controller", by_rosbags, controller("reference", "feedback"), expected, "", NOTHING, followed),
@@ -254,16 +253,46 @@ def called_as_commands() -> list[Case]:
     force[:, 2] = 3.0 * np.sin(2.0 * np.pi * 2.1 * np.arange(3000) / 100.0)
     cycle = {"/cmd/wrench force.z: frequency": 2.1, "/cmd/wrench force.z: cycle, peak to peak": 6.0}
     named = topic_map(["/goal/ref"], [], [], [], [])
-    time = np.arange(0.0, 20.0, 0.002)
-    path = np.sin(np.outer(time, (1.4, 2.6, 5.2, 10.7)) + np.arange(4.0) ** 3) @ [[0.5], [0.3], [0.15], [0.06]]
     return [
         Case("target", by_rosbags, one("/target/joint_states", 100.0, 0.7, 0.5), expected),
         Case("desired", sqlite, one("/arm_desired/desired", 200.0, 0.7, 0.5), expected),
         Case("goal", ros1, one("/goal/ref", 125.0, 0.7, 0.5), expected, "", named),
         Case("wrench", by_mcap_ros2, wrenches("/cmd/wrench", np.arange(3000) / 100.0, force), cycle),
-        Case("at another rate", by_rosbags, joints("/js", time, ["a"], position=path) +
-             joints("/cmd", time[::10], ["a"], position=path[::10]), {}, "", topic_map([], [], ["/cmd"], [], []),
-             ("Shows: a: always in motion (",)),
+    ]  # fmt: skip
+
+
+def follows() -> list[Case]:
+    """Joints and a force that follow a path, late, by a part of it, or through a play; and steps."""
+    sent, time = topic_map([], [], ["/cmd"], [], []), np.arange(0.0, 21.0, 0.004)
+
+    def path(at: Any) -> Any:
+        return 0.5 * np.sin(1.3 * at) + 0.2 * np.sin(4.1 * at)
+
+    def joint(commanded: Any, measured: Any, every: int = 10) -> list[Sent]:
+        command = joints("/cmd", time[::every], ["a"], position=commanded[::every, None])
+        return joints("/js", time, ["a"], position=np.asarray(measured)[:, None]) + command
+
+    played = list(path(time[:1]))
+    for at in path(time[1:] - 0.02):
+        played.append(min(max(played[-1], at - 0.01), at + 0.01))
+    steps = np.repeat([0.1, 0.5, -0.3], len(time) // 3)
+    risen = steps + np.repeat([0.0, -0.4, 0.8], len(time) // 3) * np.exp(-np.maximum(time % 7.0 - 0.06, 0.0) / 0.2)
+    points = [{"positions": [q], "time_from_start": {"sec": s}} for s, q in ((2, 1.0), (4, 1.0), (9, -0.5))]
+    trajectory = Sent("/t", TRAJECTORY, 2.0, 2.0, "", {"joint_names": ["a"], "points": points})
+    late = np.interp(time - 2.1, (2.0, 4.0, 9.0), (1.0, 1.0, -0.5)) - 0.03
+    force = np.outer(path(time), (0.0, 0.0, 3.0)) + 5.0
+    noise = 0.01 * np.random.default_rng(4).normal(size=force.shape)
+    return [
+        Case("late", by_rosbags, joint(path(time), 0.9 * path(time - 0.03)), {"a position: gain": 0.9,
+             "a position: delay": 0.03}, "", sent, ("Shows: a position: follows ",)),
+        Case("play", ros1, joint(path(time), played, 2),
+             {"a position: play": 0.02, "a position: delay": 0.02}, "", sent),
+        Case("steps", sqlite, joint(steps, risen - 0.02), {"a position: largest steady error": 0.02,
+             "a position: median rise time 10-90 %": 0.2 * math.log(9.0)}, "", sent),
+        Case("a trajectory", by_rosbags, [*joint(late, late)[: len(late)], trajectory],
+             {"a position: delay": 0.1, "a position: largest steady error": 0.03}, "", NOTHING, ("/t: 1 message;",)),
+        Case("a force", by_mcap_ros2, wrenches("/f", time + 0.05, 0.8 * force + noise) + wrenches("/cmd", time, force),
+             {"/f force.z: gain": 0.8, "/f force.z: delay": 0.05}, "", sent),
     ]  # fmt: skip
 
 
@@ -503,7 +532,7 @@ def other_units() -> list[Case]:
 
 KINDS = (
     held_over, wrong_efforts, other_units, wraps, sparse, coarse, twice, names, called_as_commands,
-    few_cycles, still, brief_rests, zeros, contradictions, formats, of_ros2_control, by_chance,
+    follows, few_cycles, still, brief_rests, zeros, contradictions, formats, of_ros2_control, by_chance,
 )  # fmt: skip
 CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
 

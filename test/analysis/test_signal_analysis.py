@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wam_analysis.findings.efficiency import works
-from wam_analysis.held_messages import force_changes
+from wam_analysis.held_messages import value_changes
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import limit_cycle
@@ -93,7 +93,7 @@ def test_the_three_strongest_lines_are_listed_beside_a_much_larger_motion():
 
 def test_a_slow_ramp_of_a_command_is_no_constant_force():
     ramp = np.clip(np.arange(4000) / 1000.0 - 1.0, 0.0, 2.0)[:, np.newaxis] * (0.0, 1.0, 0.0)  # by 0.001 N a message
-    (times,) = np.nonzero(force_changes(ramp))
+    (times,) = np.nonzero(value_changes(ramp))
     assert (len(times), times[0], times[-1]) == pytest.approx((193, 1009, 2996), abs=12)
 
 

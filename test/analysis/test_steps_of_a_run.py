@@ -21,10 +21,9 @@ from wam_analysis.contact_list import CUT, NOT_PLACED, listed_contacts
 from wam_analysis.findings.analysis import SECTIONS_OF_STEPS, TOPICS_READ, Analysis, analyse_bag, analyse_steps
 from wam_analysis.findings.contact import BLIND
 from wam_analysis.findings.finding import Section
-from wam_analysis.findings.force import _other_reactions, press_findings
+from wam_analysis.findings.force import press_findings
 from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
-from wam_analysis.holds import Hold
 from wam_analysis.recorded import RecordedArm, prediction_parameters, recorded_arm
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
@@ -580,13 +579,6 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
         Event(Code.REFUSED, values={"reason": "why", "holds": 1.0}),
     )
     assert in_words("press", [reaction], traces.zero) == [("press: refused from 5.00 to 7.00 s", "why")]
-
-
-def test_what_is_reported_briefly_during_a_force_has_its_name():
-    hold = Hold(0, 5000 * MS, "base", np.ones(3), name="8 N")
-    during, after = (RecordedReaction(at, at + 30 * MS, Event(Code.NOT_REACHED)) for at in (2000 * MS, 6000 * MS))
-    run = SimpleNamespace(reactions=[during, after], holds=(hold,), steps=())
-    assert _other_reactions(run) == {"8 N": (during,), "force loop": (after,)}
 
 
 def without_truth(recording: Played) -> Played:

@@ -5,6 +5,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -156,11 +157,11 @@ def circles(root: Path) -> list[str]:
         targets |= {target.rpartition(".")[0] for target in targets}  # what is imported may be a name in a module
         own = name.split(".")[0]
         below[name] = {to for to in targets & modules.keys() - {name} if to.split(".")[0] == own}
-    while ends := {name for name, targets in below.items() if not targets & below.keys()}:
-        below = {name: targets for name, targets in below.items() if name not in ends}
-    while tops := below.keys() - {to for targets in below.values() for to in targets}:
-        below = {name: targets for name, targets in below.items() if name not in tops}
-    return sorted(below)
+    try:
+        TopologicalSorter(below).prepare()
+    except CycleError as error:
+        return sorted({*error.args[1]})
+    return []
 
 
 def source_lines(root: Path) -> Counter[str]:

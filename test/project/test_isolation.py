@@ -1,7 +1,6 @@
 """Tests test the tree, in ROS domains of their own, and disturb nobody."""
 
 import importlib
-import sys
 from pathlib import Path
 
 import pytest
@@ -17,12 +16,6 @@ LINUX_GIVES = range(32768, 61000)  # ports, to any program; /proc/sys/net/ipv4/i
 @pytest.mark.parametrize("package", sorted(path.name for path in ROOT.glob("wam_*") if path.is_dir()))
 def test_the_tree_is_tested_and_not_an_installed_copy(package: str) -> None:
     assert importlib.import_module(package).__path__ == [str(ROOT / package)]
-
-
-def test_the_tree_comes_before_what_is_installed() -> None:
-    paths = [Path(path) for path in sys.path]
-    assert ROOT in paths
-    assert not any("site-packages" in path.parts for path in paths[: paths.index(ROOT)])
 
 
 def test_domains_of_the_tests_are_none_that_a_user_takes() -> None:

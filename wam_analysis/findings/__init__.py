@@ -6,6 +6,7 @@ held_force             each commanded force: measures and predictions
 steps                  section about the steps of a scenario, in answers
 topics                 section about the topics of another robot, and what was done to their values
 force_steps            section about steps of a commanded force of another robot
+following              section about gain, delay, play and steady error of what is commanded to another robot
 repetition             sections about cycles and lines in a spectrum, of another robot
 effort                 section about friction and inertia of another robot
 stick_slip             section about rest and motion of motors and joints

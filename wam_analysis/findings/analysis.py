@@ -11,6 +11,7 @@ from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.efficiency import efficiency_section
 from wam_analysis.findings.effort import effort_section
 from wam_analysis.findings.finding import Section, counted, deviations, shown, stated
+from wam_analysis.findings.following import following_section
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.force_steps import step_section
 from wam_analysis.findings.friction import friction_section
@@ -281,6 +282,7 @@ SECTIONS: tuple[Maker, ...] = (
     efficiency_section, timing_section,
 )  # fmt: skip
 FOREIGN_SECTIONS: tuple[Maker, ...] = (
-    topics_section, step_section, repetition_section, stick_section, effort_section, spectrum_section, timing_section,
+    topics_section, step_section, following_section, repetition_section, stick_section, effort_section,
+    spectrum_section, timing_section,
 )  # fmt: skip
 """Each makes its section of a recording, or None where the recording has nothing for it."""

@@ -8,10 +8,10 @@ import numpy as np
 from wam_analysis.findings.effort import limited
 from wam_analysis.findings.finding import Finding, Section, counted, shown, when
 from wam_analysis.findings.force import fate_words, response_findings
-from wam_analysis.findings.repetition import is_known
+from wam_analysis.findings.repetition import LEAST, is_known
 from wam_analysis.findings.topics import frame_change
 from wam_analysis.foreign.sources import AXES, Source, jumps, pieces
-from wam_analysis.held_messages import force_changes, row_at
+from wam_analysis.held_messages import row_at, value_changes
 from wam_analysis.measures.response import StepResponse, force_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings
@@ -52,7 +52,7 @@ def _along(measured: Source, command: Source) -> Source:
 
 
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
-    """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction.
+    """The steps of a command, and how what was measured followed; a force may have the sign of the reaction.
 
     A step ends where the sender of either goes over to another frame; one from another frame is none.  Axes that are
     not known of both are left out.
@@ -63,7 +63,8 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     if not axes or not np.any(known):
         return []
     desired = np.column_stack([command.values[axis] for axis in axes])
-    edges = np.flatnonzero([True, *force_changes(desired), True])
+    least = LEAST[measured.units[axes[0]]] if measured.is_joint else HOLD.equal_force
+    edges = np.flatnonzero([True, *value_changes(desired, least), True])
     at = np.append(command.time, measured.time[-1])[edges]
     is_held = command.arrives[edges[:-1]] | (np.diff(at) >= HOLD.shortest)  # or else part of a ramp
     is_held[0] = True
@@ -71,7 +72,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     got = np.column_stack([measured.values[axis][known] for axis in axes])
     wanted = desired[row_at(command.time, measured.time[known])]
     middle = wanted.mean(axis=0) if np.any(wanted != wanted[0]) else 0.0
-    sign = np.sign(np.sum(got * (wanted - middle))) or 1.0
+    sign = 1.0 if measured.is_joint else np.sign(np.sum(got * (wanted - middle))) or 1.0
     found, held = [], np.flatnonzero(is_held)
     for left, part in zip([0, *held + 1], held, strict=False):
         row, begin = edges[part], max(float(at[part]), float(measured.time[0]))
@@ -79,7 +80,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
         since, was = at[left], desired[edges[left] - 1] * (left > 0)
         change = desired[row] - was
         size = float(np.linalg.norm(change))
-        if size <= HOLD.equal_force or command.arrives[row] or end - begin < HOLD.shortest:
+        if size <= least or command.arrives[row] or end - begin < HOLD.shortest:
             continue
         way = change / size
         way *= np.sign(way[np.argmax(np.abs(way))])
@@ -98,9 +99,11 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     return found
 
 
-def step_section(recording: AnalysedRecording) -> Section:
-    """Steps of a commanded force or torque, and how the measured one followed."""
+def step_section(recording: AnalysedRecording) -> Section | None:
+    """Steps of a commanded force or torque, and how the measured one followed; None where no force was recorded."""
     forces, commands = [one for one in recording.states if not one.is_joint], recording.commands
+    if not forces:
+        return None
     pairs = [(one, recording.command_of(one)) for one in forces]
     followed = [(one, command) for one, command in pairs if command is not None]
     sentences, findings, shows = [], [], []
@@ -142,7 +145,7 @@ def step_section(recording: AnalysedRecording) -> Section:
             error = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
             shows.append(f"{counted(len(steps), f'{quantity} step')}; the largest steady error is {error}.")
     if not shows and not doubts:
-        hint = "; name the topic of its command with --command" * bool(forces and not followed)
+        hint = "; name the topic of its command with --command" * (not followed)
         sentences.append(f"No step of a commanded force was recorded{hint}.")
     doubts += [text for pair in pairs if (text := _tared(*pair))]
     doubts += [

@@ -132,10 +132,10 @@ def rest_speed(piece: Piece, least: float) -> float:
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:
     speed, position = command.only("velocity"), command.only("position")
     if len(speed.time) >= SHAFT.fewest_samples and np.any(speed.values.get("velocity", 0.0)):
-        return np.interp(time, speed.time, speed.values["velocity"])
+        return np.interp(time, speed.time, speed.values["velocity"], 0.0, 0.0)
     if len(position.time) < SHAFT.fewest_samples:  # it is sent once and held
         return np.zeros(len(time))
-    return np.interp(time, position.time, np.gradient(position.values["position"], position.time))
+    return np.interp(time, position.time, np.gradient(position.values["position"], position.time), 0.0, 0.0)
 
 
 def contradiction(source: Source) -> str:

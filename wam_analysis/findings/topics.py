@@ -22,7 +22,9 @@ UNUSUAL = {  # values in the unit of ROS that few robots reach
 def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
-    sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
+    sentences = [
+        line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns, bag.counts.get(name, 0))
+    ]
     wrong = [*in_words(found), *(f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note)]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
@@ -49,13 +51,14 @@ def frame_change(source: Source) -> str:
     return f"{source.topic} changes to the frame {source.frame or 'without a name'} {when(at)}" if len(at) else ""
 
 
-def _topic(name: str, columns: Columns) -> Iterator[str]:
-    """What a topic holds."""
+def _topic(name: str, columns: Columns, count: int) -> Iterator[str]:
+    """What a topic of so many messages holds, of 0 where their number is that of its rows."""
     if isinstance(columns, JointColumns) and len(columns.stamp_ns):
         has = np.isfinite(np.hstack([columns.position, columns.velocity, columns.effort]))
         number = len(columns.names)
-        messages = np.count_nonzero(np.any(has, axis=1)) or len(has)  # a table has rows of other topics
-        yield f"{name}: {messages} messages; joints: {', '.join(columns.names)}."
+        rows = np.count_nonzero(np.any(has, axis=1)) or len(has)  # a table has rows of other topics
+        messages = int(min(count or rows, rows))  # a trajectory has many
+        yield f"{name}: {counted(messages, 'message')}; joints: {', '.join(columns.names)}."
         if none := [joint for i, joint in enumerate(columns.names) if not np.any(has[:, i::number])]:
             yield f"{name}: {', '.join(none)} without a number for position, velocity or effort."
     elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):

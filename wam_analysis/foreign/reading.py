@@ -16,6 +16,7 @@ from wam_bag.columns import JOINT_FIELDS, UNNAMED, joint_columns
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 INTERFACES = "control_msgs/msg/DynamicJointState"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 POINTS = {"feedback": "", "actual": "", "reference": " command", "desired": " command"}  # of controllers, new and old
 OF_POINT = {"position": "positions", "velocity": "velocities", "effort": "effort"}
 FIELDS = {  # of the types that are known: suffix of the topic, and fields by quantity
@@ -28,6 +29,7 @@ FIELDS = {  # of the types that are known: suffix of the topic, and fields by qu
     ],
 }
 COMMAND = "command"
+PATH_STEP = 10_000_000  # ns, of the path of a trajectory
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
 
 
@@ -46,7 +48,13 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
         if a topic, joint or field of the map is not there.
     """
     kinds = {source.types[name] for name, number in source.counts.items() if number}
-    read_as_it_is = {JOINTS, WRENCH, CONTROLLER, *([] if JOINTS in kinds else [INTERFACES])}  # which has the same again
+    read_as_it_is = {
+        JOINTS,
+        WRENCH,
+        CONTROLLER,
+        TRAJECTORY,
+        *([] if JOINTS in kinds else [INTERFACES]),
+    }  # which has the same again
     named = (*given.topics, *given.commands)
     chosen = [
         name for name, kind in source.types.items() if name in named or (kind in read_as_it_is and not given.topics)
@@ -66,8 +74,9 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
             if part in topics and not any(getattr(found, q).size for q in JOINT_FIELDS):
                 continue  # names that a controller of this version leaves empty
             topics[part] = _scaled(found, given)
-            is_command = part in given.commands or (bag.types[name] == CONTROLLER and part != name)
-            types[part] = COMMAND if is_command else bag.types[name]
+            kind = bag.types[name]
+            is_command = part in given.commands or kind == TRAJECTORY or (kind == CONTROLLER and part != name)
+            types[part] = COMMAND if is_command else kind
     return checked(bag._replace(topics=topics, types=types), given)
 
 
@@ -99,6 +108,8 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
     """The columns of a topic by name; those of a controller's state are two: feedback and reference."""
     if isinstance(columns, (JointColumns, WrenchColumns)):
         yield topic, columns
+    elif kind == TRAJECTORY and columns.messages:
+        yield topic, _paths(topic, columns, given)
     elif columns.messages:
         for suffix, fields in _fields(kind, columns.messages, given):
             has_joints, has_wrench = any(q in fields for q in JOINT_FIELDS), "force" in fields or "torque" in fields
@@ -160,11 +171,10 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     if "," in path:
         return joined_times(*np.vstack(_numbers(topic, columns, path)).T.astype(np.int64))
     stamps = [_at(topic, message, path) for message in columns.messages]
-    for whole, rest in PARTS_OF_TIME:
-        if hasattr(stamps[0], whole) and hasattr(stamps[0], rest):
-            if "stamp" in given.units:
-                raise ValueError(f"{topic} has stamps of ROS, in s and ns; --unit stamp is for numbers")
-            return np.array([getattr(one, whole) * BILLION + getattr(one, rest) for one in stamps], np.int64)
+    if _whole(stamps[0]) is not None:
+        if "stamp" in given.units:
+            raise ValueError(f"{topic} has stamps of ROS, in s and ns; --unit stamp is for numbers")
+        return np.array([*map(_whole, stamps)], np.int64)
     numbers = np.array(stamps)
     try:
         numbers = numbers if numbers.dtype.kind in "iu" else numbers.astype(np.float64)
@@ -222,6 +232,33 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
     ]
     found = joint_columns(columns.log_time_ns, groups)
     return found if "name" in fields else _named(found)
+
+
+def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
+    """The paths of trajectories, straight between their points, each until the next one begins."""
+    begins = _times(topic, columns, {}, given)
+    begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
+    groups, times, held = list[Any](), [np.zeros(0, np.int64)], list[Numbers]()
+    for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
+        points, names = message.points, tuple(map(str, message.joint_names))
+        knots = [begin + _whole(point.time_from_start) for point in points]
+        fields = [np.array([getattr(one, own) for one in points], np.float64).reshape(len(points), -1)
+                  for own in OF_POINT.values()]  # fmt: skip
+        if [one.shape[1:] for one in held] == [one.shape[1:] for one in fields] and knots[0] > begin:
+            knots, fields = [begin, *knots], [np.vstack(pair) for pair in zip(held, fields, strict=True)]
+        at = np.unique([*knots, *np.arange(begin, max(knots, default=begin), PATH_STEP)])
+        at = at[(at >= min(knots, default=math.inf)) & (at < end)]
+        taken = [np.array([np.interp(at, knots, one) for one in field.T]).reshape(-1, len(at)).T for field in fields]
+        held = [field[-1:] for field in taken]
+        groups.append((np.arange(len(at)) + sum(map(len, times)), (at, message.header.frame_id, names, taken)))
+        times.append(at)
+    return joint_columns(np.concatenate(times), groups)
+
+
+def _whole(stamp: Any) -> int | None:
+    """An instant or a duration of ROS, ns; None where it is none."""
+    parts = (pair for pair in PARTS_OF_TIME if all(hasattr(stamp, part) for part in pair))
+    return next((getattr(stamp, whole) * BILLION + getattr(stamp, rest) for whole, rest in parts), None)
 
 
 def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> WrenchColumns:

@@ -1,0 +1,68 @@
+"""Section about how what was measured follows its command: joints in steps, joints and forces in motion."""
+
+import math
+
+import numpy as np
+
+from wam_analysis.findings.finding import Finding, Section, counted, shown
+from wam_analysis.findings.force_steps import force_steps
+from wam_analysis.findings.repetition import LEAST
+from wam_analysis.foreign.sources import AXES, Source
+from wam_analysis.held_messages import value_changes
+from wam_analysis.measures.following import Following, following
+from wam_analysis.recording import AnalysedRecording
+from wam_analysis.thresholds import SHAFT
+from wam_bag.columns import JOINT_FIELDS
+
+
+def following_section(recording: AnalysedRecording) -> Section | None:
+    """How what was measured follows its command; None where nothing was commanded."""
+    sentences, findings = list[str](), list[Finding]()
+    for one in recording.states:
+        if (command := recording.command_of(one)) is None:
+            continue
+        quantities = [q for q in (*JOINT_FIELDS, *AXES) if q in command.values and q in one.values]
+        for quantity in quantities[: 1 if one.is_joint else len(AXES)]:
+            name, unit = f"{one.label} {quantity}", one.units[quantity]
+            measured, wanted = one.only(quantity), command.only(quantity)
+            found, steps = _following(measured, wanted), force_steps(measured, wanted) if one.is_joint else []
+            numbers, remarks = dict[str, tuple[float, str]](), list[str]()
+            if found:
+                remarks.append(_words(found, unit))
+                numbers |= {"error, rms": (found.rms, unit), "largest error": (found.largest, unit)}
+            if found and found.unexplained < SHAFT.agree:
+                numbers |= {"gain": (found.gain, ""), "delay": (found.delay, "s")}
+                numbers |= {"play": (found.play, unit)} if found.play else {}
+            if steps:
+                worst = max(steps, key=lambda step: step.error)
+                off = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
+                remarks.append(f"{counted(len(steps), 'step')}; the largest steady error is {off}")
+                numbers["largest steady error"] = (worst.error, unit)
+                known = [step.response for step in steps if math.isfinite(step.response.rise)]
+                if known and found is None:  # a path has a rise of its own
+                    numbers["median rise time 10-90 %"] = (float(np.median([one.rise for one in known])), "s")
+                    numbers["largest overshoot"] = (100.0 * max(one.overshoot for one in known), "%")
+            sentences += [f"{name}: {'; '.join(remarks)}."] if remarks else []
+            findings += [Finding(f"{name}: {what}", of, value) for what, (value, of) in numbers.items()]
+    return Section("following", "Commands", sentences, findings, sentences) if sentences else None
+
+
+def _words(found: Following, unit: str) -> str:
+    """How a quantity follows, in words."""
+    error = f"the largest error is {shown(found.largest, unit)}"
+    if not found.unexplained < SHAFT.agree:
+        left = shown(100.0 * found.unexplained, "%")
+        return f"a gain and a delay do not explain {left} of how it follows its command; {error}"
+    play = f" and a play of {shown(found.play, unit)}" * bool(found.play)
+    when = f"{shown(abs(found.delay), 's')} {'after' if found.delay >= 0.0 else 'before'} its command"
+    return f"follows {when}, with a gain of {shown(found.gain)}{play}; {error}"
+
+
+def _following(measured: Source, command: Source) -> Following | None:
+    """How the only quantity of a source follows that of its command; None where the command hardly moves."""
+    ((quantity, value),), (sent,) = measured.values.items(), command.values.values()
+    moves = np.count_nonzero(value_changes(sent[:, np.newaxis], LEAST[measured.units[quantity]]))
+    known = (measured.time >= command.time[0]) & ~command.is_away(measured.time)
+    if moves < SHAFT.fewest_samples or np.count_nonzero(known) < SHAFT.fewest_samples:
+        return None
+    return following(measured.time[known], value[known], command.time, sent)

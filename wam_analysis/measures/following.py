@@ -1,0 +1,109 @@
+"""How a signal follows a command that moves: by a factor, a delay and a play."""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_analysis.thresholds import CYCLE, SHAFT
+from wam_bag.arrays import Numbers
+
+GOLDEN = (0.382, 0.618)  # parts of an interval, between which the least is looked for
+
+
+class Following(NamedTuple):
+    """How a signal follows its command.
+
+    Attributes
+    ----------
+    rms, largest : error, in the unit of the signal.
+    gain, delay : the signal is `gain` times the command of `delay` s before, and a constant.
+    play : by which the command moves after it turned until the signal does, 0 where that does not show.
+    unexplained : rms of what these leave, over that of the motion.
+    """
+
+    rms: float
+    largest: float
+    gain: float
+    delay: float
+    play: float
+    unexplained: float
+
+
+class _Fit(NamedTuple):
+    """Rest of a fit, rms, and its numbers."""
+
+    rest: float
+    delay: float
+    gain: float
+
+
+def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> Following:
+    """How a signal follows its command.
+
+    The command is a path that is sent in points, or it is held from message to message where that fits much better.
+
+    Parameters
+    ----------
+    time, value : (n,), s, rising, and the signal.
+    stamps, sent : (m,), s, rising, and the command, which moves.
+    """
+    paths = [(stamps, sent), (np.repeat(stamps, 2)[1:], np.repeat(sent, 2)[:-1])]
+    error = min((value - np.interp(time, *path) for path in paths), key=lambda one: float(one @ one))
+    rms, largest = math.sqrt(np.mean(error**2)), float(np.max(np.abs(error)))
+    some = slice(None, None, math.ceil(len(time) / CYCLE.compared))
+    time, value = time[some], value[some] - np.mean(value[some])
+    motion = float(np.std(value)) or math.inf
+    fits = [_searched(time, value, *path) for path in paths]
+    is_held = fits[1].rest < SHAFT.much_better * fits[0].rest
+    fit, (stamps, sent) = fits[is_held], paths[is_held]
+
+    def with_play(play: float) -> _Fit:
+        return _searched(time, value, stamps, _played(sent, play))
+
+    low, high = 0.0, 2.0 * largest / max(abs(fit.gain), 1.0)
+    for _ in range(CYCLE.sections):
+        at = [low + share * (high - low) for share in GOLDEN]
+        low, high = (low, at[1]) if with_play(at[0]) < with_play(at[1]) else (at[0], high)
+    play = 0.5 * (low + high)
+    loose = with_play(play)
+    if loose.rest < SHAFT.much_better * fit.rest:
+        return Following(rms, largest, loose.gain, loose.delay, play, loose.rest / motion)
+    return Following(rms, largest, fit.gain, fit.delay, 0.0, fit.rest / motion)
+
+
+def _played(path: Numbers, play: float) -> Numbers:
+    """What moves a path through a play, which it begins in the middle."""
+    moved, at = np.empty(len(path)), float(path[0])
+    turns = [0, *(np.flatnonzero(np.diff(np.sign(np.diff(path)))) + 1).tolist(), len(path)]
+    for begin, end in pairwise(turns):
+        part = path[begin:end]
+        moved[begin:end] = np.clip(at, part - 0.5 * play, part + 0.5 * play)
+        at = float(moved[end - 1])
+    return moved
+
+
+def _searched(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> _Fit:
+    """The fit with the delay that leaves least; of a command that repeats it is the shortest of those."""
+    span = CYCLE.longest_delay * np.linspace(-1.0, 1.0, CYCLE.delays)
+    fits = [_fit(time, value, stamps, sent, delay) for delay in span.tolist()]
+    right = [one for one in fits if one.gain > 0.0] or fits
+    if SHAFT.much_better * min(right).rest > min(fits).rest:
+        right = fits  # its sign is the other one
+    alike = [one for one in right if SHAFT.better * one.rest <= min(right).rest]
+    best = min(alike, key=lambda one: abs(one.delay))
+    for finer in (0.5 * CYCLE.delays, (0.5 * CYCLE.delays) ** 2):
+        near = best.delay + span / finer
+        best = min(_fit(time, value, stamps, sent, delay) for delay in near.tolist())
+    return best
+
+
+def _fit(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers, delay: float) -> _Fit:
+    """The fit for one delay; the mean of the signal is 0."""
+    path = np.interp(time - delay, stamps, sent)
+    path = path - np.mean(path)
+    power = float(path @ path)
+    gain = float(path @ value) / power if power else 0.0
+    rest = value - gain * path
+    return _Fit(math.sqrt(float(rest @ rest) / len(rest)), delay, gain)
