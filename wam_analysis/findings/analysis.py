@@ -77,7 +77,7 @@ class Analysis(NamedTuple):
         return (*failed, *wrong)
 
     def __repr__(self) -> str:
-        return f"Analysis({self.recording.run.bag!r}, {self.recording.duration:.1f} s, {len(self.sections)} sections)"
+        return f"Analysis({self.recording.bag!r}, {self.recording.duration:.1f} s, {len(self.sections)} sections)"
 
 
 def analyse(

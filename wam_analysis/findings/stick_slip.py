@@ -21,7 +21,8 @@ def stick_section(recording: AnalysedRecording) -> Section:
     findings, verdict, alike = [], [], defaultdict[str, list[str]](list)
     wrong = [] if recording.is_foreign else [*_slipped(recording.states)]
     for one in recording.states:
-        least = SHAFT.motor_rest if one.topic == f"{recording.namespace}/motor_states" else SHAFT.joint_rest
+        is_motor = not recording.is_foreign and one.topic.endswith("/motor_states")
+        least = SHAFT.motor_rest if is_motor else SHAFT.joint_rest
         found = sticking(one, recording.command_of(one), least) if one.is_joint else None
         if found is None:
             continue

@@ -246,8 +246,9 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
                   for own in OF_POINT.values()]  # fmt: skip
         if [one.shape[1:] for one in held] == [one.shape[1:] for one in fields] and knots[0] > begin:
             knots, fields = [begin, *knots], [np.vstack(pair) for pair in zip(held, fields, strict=True)]
-        at = np.unique([*knots, *np.arange(begin, max(knots, default=begin), PATH_STEP)])
-        at = at[(at >= min(knots, default=math.inf)) & (at < end)]
+        first, last = min(knots, default=end), end if math.isfinite(end) else max(knots, default=begin)
+        at = np.unique([*knots, *np.arange(first, last, PATH_STEP)])
+        at = at[at < end]
         taken = [np.array([np.interp(at, knots, one) for one in field.T]).reshape(-1, len(at)).T for field in fields]
         held = [field[-1:] for field in taken]
         groups.append((np.arange(len(at)) + sum(map(len, times)), (at, message.header.frame_id, names, taken)))

@@ -37,6 +37,7 @@ class Treatment(StrEnum):
     UNFILLED = "the {quantity} is 0 in every message although the position moves; the rate of that is used"
     LATE = "the {quantity} is about {size}, as by a filter; the rate of the position is used"
     SCALED = "the {quantity} is {factor:.3g} times the rate of the position; that rate is used"
+    FROZEN = "the {quantity} stands still in motion in {number} of {of} messages, and then jumps on; they are left out"
     SPIKES = "the {quantity} jumps away and back {times}, by up to {size}; the mean of its neighbours is used"
     SPARSE = "{quantity} in only {number} of {of} messages"
 
@@ -379,16 +380,59 @@ def _treated(one: Source) -> Source:
             values[quantity][rows] = mean
             size = np.max(np.abs(value[rows] - mean))
             treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
-    at, moves = _jumps(one._replace(values=measured))  # again, without the spikes
-    if len(sizes := moves[moves != 0.0]):
-        values["position"] = values["position"] - np.cumsum(moves)[row_at(at, one.time)]
-        treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
+    if not one.is_command:
+        values, found = _without_jumps(one._replace(values=values))
+        treated += found
     factor, unfit = velocity_fit(one._replace(values=values))
     if unfit and not one.is_command:
         del values["velocity"]
         treated.append(unfit)
         factor = math.nan
     return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
+
+
+def _without_jumps(one: Source) -> tuple[dict[str, Numbers], list[Treated]]:
+    """Values without what stands still before a jump, and without jumps of the zero; what of these there is.
+
+    Of a joint without a velocity, which comes back, or never moves otherwise, nothing shows that it did not move.
+    """
+    values, treated = dict(one.values), []
+    at, moves = _jumps(one)
+    shown = values.get("position", at)[row_at(one.time, at)]
+    frozen = [
+        (first, after) for after in np.flatnonzero(moves).tolist() if (first := _frozen(at, shown, after)) < after
+    ]
+    for first, after in frozen:
+        moves[after] = 0.0
+        begin, end = row_at(one.time, at[[first, after]])
+        for quantity, value in one.values.items():
+            if np.all(value[begin:end] == value[begin]):
+                values[quantity] = values[quantity].copy()
+                values[quantity][begin + 1 : end] = math.nan
+    if frozen:
+        number = sum(after - first - 1 for first, after in frozen)
+        treated.append(Treated(Treatment.FROZEN, "position", number, len(at)))
+    sizes = moves[moves != 0.0]
+    comes_back = abs(np.sum(sizes)) < SHAFT.much_better * np.sum(np.abs(sizes))
+    if not len(sizes) or ("velocity" not in values and comes_back):
+        return values, treated
+    position = values["position"] - np.cumsum(moves)[row_at(at, one.time)]
+    if "velocity" in values or not rests(one._replace(values={"position": position})):
+        values["position"] = position
+        treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
+    return values, treated
+
+
+def _frozen(time: Numbers, position: Numbers, after: int) -> int:
+    """First of the rows of one value before a jump by what was moved meanwhile; the jump's where there are none."""
+    first = int(np.max(np.flatnonzero(np.diff(position[:after])), initial=-1)) + 1
+    near = STREAM.around
+    if after - first < SHAFT.rest_samples or first < near or after + near >= len(time):
+        return after
+    rates = [(position[row] - position[row - near]) / (time[row] - time[row - near]) for row in (first, after + near)]
+    jump = position[after] - position[first]
+    moved = float(np.mean(rates)) * (time[after] - time[first])
+    return first if abs(jump - moved) < SHAFT.much_better * abs(jump) else after
 
 
 def _spikes(value: Numbers, least: float) -> Index:
