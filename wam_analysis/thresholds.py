@@ -13,6 +13,8 @@ class ShaftThresholds:
     joint_rest: float = 0.002  # rad/s or m/s; a slower joint is at rest
     shortest_phase: float = 0.01  # s; a shorter stick or slip is chatter
     window: float = 0.03  # s over which friction is averaged
+    widest_window: float = 0.24  # s, likewise, of a joint whose motions are long
+    of_motion: float = 0.25  # of a motion in one direction: so much of it is averaged over
     noisy: float = 6.0  # standard deviations of the noise of a velocity: a joint that is slower is at rest
     far: float = 20.0  # resolutions of a position: who moves so far has moved
     rest_samples: int = 3  # of a rest between motions: fewer may be a turn
@@ -45,10 +47,12 @@ class ShaftThresholds:
     hidden: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
     much_better: float = 0.5  # of the rest of a fit: one with a lag leaves less
     better: float = 0.9  # the same of another lag than the reversals show
+    stribeck: tuple[float, float, int] = (0.01, 0.4, 12)  # of the largest speed, and how many are tried between
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1
     filtered: int = 4  # lags of an effort after which a filter, of that time constant, has left 2 % of a step
+    turning_steps: float = 3.0  # times as often as at the step before a value is at its last one, where it is limited
     limited: float = 0.1  # of the time, in which an effort is exactly at its bounds
     agree: float = 0.1  # by which a recorded velocity may differ from the rate of the position
     late: float = 0.02  # of a velocity, by which a delay or a scale changes it: less is not seen in the friction

@@ -8,8 +8,9 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import contradiction, rest_speed
-from wam_analysis.foreign.sources import Source, pieces, rests
+from wam_analysis.foreign.sources import Piece, Source, pieces, rests
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
+from wam_analysis.measures.runs import smoothed
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.arrays import Mask, Numbers
@@ -99,14 +100,19 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
 
 
 def limited(source: Source, quantity: str = "effort") -> str:
-    """That a quantity stays at its bounds for long, which none with its noise does; '' where it does not."""
+    """That a quantity stays at a bound for long, which none with its noise does; '' where it does not.
+
+    One in coarse steps stays at its last step for 2.4 times as long as at the one before, at most, as it turns there.
+    """
     value = source.only(quantity).values.get(quantity, np.zeros(0))
-    bounds = (float(np.min(value, initial=math.inf)), float(np.max(value, initial=-math.inf)))
-    share = float(np.mean(np.isin(value, bounds) & (value != 0.0))) if bounds[0] < bounds[1] else 0.0  # 0 is off
+    levels, numbers = np.unique(value, return_counts=True)
+    ends = [(0, 1), (-1, -2)] if len(levels) > 1 else []
+    bounds = [levels[at] for at, next_to in ends if levels[at] and numbers[at] > SHAFT.turning_steps * numbers[next_to]]
+    share = float(np.mean(np.isin(value, bounds))) if bounds else 0.0  # 0 is off
     if share < SHAFT.limited:
         return ""
-    low, high = (shown(bound, source.units[quantity]) for bound in bounds)
-    return f"the {quantity} is exactly {low} or {high} in {100.0 * share:.0f} % of the messages, as if it was limited"
+    named = " or ".join(shown(bound, source.units[quantity]) for bound in bounds)
+    return f"the {quantity} is exactly {named} in {100.0 * share:.0f} % of the messages, as if it was limited"
 
 
 def _is_known(found: Friction) -> bool:
@@ -126,12 +132,24 @@ def friction(source: Source) -> tuple[Friction, float]:
     c v|v|, and may lag behind the motion, as where it is filtered, or the motion behind it: a lag that leaves much less
     of the effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the
     inertia is NaN; so are viscous friction and lag, and no lag is looked for.
+
+    All is averaged over a short time, or, where a coarse or noisy velocity makes that uncertain or hides a lag, over a long one.
     """
     some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
     if not some:
         return Friction(), 0.0
     period = some[0].period
-    window = max(SHAFT.window, SHAFT.window_samples * period)
+    shortest = max(SHAFT.window, SHAFT.window_samples * period)
+    motions = np.concatenate([_motions(piece.values["velocity"], round(shortest / period)) for piece in some])
+    typical = period * float(motions @ motions) / float(np.sum(motions))  # most of the time is in one so long
+    widest = max(shortest, min(SHAFT.of_motion * typical, SHAFT.widest_window))
+    every = [_friction(source.units["position"], some, window) for window in {shortest, widest}]
+    return min(every, key=lambda one: (not one[1], sum(number.relative for number in one[0][1:4])))
+
+
+def _friction(unit: str, some: Sequence[Piece], window: float) -> tuple[Friction, float]:
+    """The same from the pieces of a joint, its position in a unit, averaged over a window, s."""
+    period = some[0].period
     most = math.ceil(CYCLE.longest_lag / period)
     width = round(window / period)
     apart = 2 * (width + most + 1)  # samples between two pieces
@@ -143,18 +161,21 @@ def friction(source: Source) -> tuple[Friction, float]:
     }
     velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)
     way = [joined[q] for q in ("position",) if q in joined]
-    weight = [*way, *(of(q) for q in way for of in (np.sin, np.cos) if source.units["position"] == "rad")]  # or spring
+    weight = [*way, *(of(q) for q in way for of in (np.sin, np.cos) if unit == "rad")]  # or spring
     loads = np.column_stack([velocity * np.abs(velocity), *weight])  # with a drag
     rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     time = period * np.arange(len(velocity), dtype=np.float64)
 
-    def fit(shift: int, use: Mask | None = None) -> Friction:
+    def fit(shift: int, use: Mask | None = None, loads: Numbers = loads) -> Friction:
         """Friction with the effort of `shift` samples later, from the samples that may be used, all by default."""
         return identify_friction(time, velocity, np.roll(joined["effort"], -shift), rest, window, use, loads)
 
     own, noise, curve = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = bool(weight) and own < SHAFT.apart
     most *= not one_frequency
+    law, spread = _stribeck(velocity, lambda columns: fit(0, None, np.column_stack([loads, columns])), fit(0).residual)
+    if law is not None:
+        fit = partial(fit, loads=np.column_stack([loads, law]))
     found, shift = _best(fit, most)
     # where the effort is filtered, its step at a reversal is no delay; nor is one over a way before it slides
     near = math.ceil(SHAFT.filtered * SHAFT.longest_effort_lag / period)
@@ -167,8 +188,41 @@ def friction(source: Source) -> tuple[Friction, float]:
         dynamic, viscous, inertia = map(_between, found[1:4], fit(shift - 1)[1:4], fit(shift + 1)[1:4])
         found = found._replace(dynamic=dynamic, viscous=viscous, inertia=inertia)
     doubt = noise + curve * (shift * period) ** 2  # of a delay, a filter takes so much of what is in phase
-    inertia = found.inertia._replace(error=math.hypot(found.inertia.error, doubt * found.inertia.value))
-    return found._replace(inertia=UNKNOWN if one_frequency else inertia), shift * period
+    doubts = np.hypot(spread, (0.0, 0.0, doubt * found.inertia.value))
+    dynamic, viscous, inertia = (
+        one._replace(error=math.hypot(one.error, more)) for one, more in zip(found[1:4], doubts.tolist(), strict=True)
+    )
+    found = found._replace(dynamic=dynamic, viscous=viscous, inertia=UNKNOWN if one_frequency else inertia)
+    return found, shift * period
+
+
+def _rise(velocity: Numbers, speed: float, power: float) -> Numbers:
+    """The rise of dry friction towards rest by the law of Stribeck, and its change with the speed of the law."""
+    part = np.minimum((np.abs(velocity) / speed) ** power, 30.0)  # beyond, nothing is left
+    return np.column_stack([np.sign(velocity) * np.exp(-part), np.sign(velocity) * part * np.exp(-part)])
+
+
+def _stribeck(
+    velocity: Numbers, fitted: Callable[[Numbers], Friction], without: float
+) -> tuple[Numbers | None, Numbers]:
+    """Columns of the law with which a fit leaves clearly less than without one, None for none.
+
+    Then by how much dry friction, viscous friction and inertia scatter between all laws with which it leaves as little.
+    """
+    speeds = np.geomspace(*SHAFT.stribeck) * max(float(np.nanpercentile(np.abs(velocity), 95.0)), SHAFT.joint_rest)
+    laws = [_rise(velocity, speed, power) for power in (1.0, 2.0) for speed in speeds.tolist()]
+    fits = [fitted(law) for law in laws]
+    rests = np.array([fit.residual if fit.factors[-2] > 0.0 else math.inf for fit in fits])
+    if not np.min(rests) < SHAFT.better * without:
+        return None, np.zeros(3)
+    alike = [fit[1:4] for fit, rest in zip(fits, rests, strict=True) if SHAFT.better * rest <= np.min(rests)]
+    return laws[int(np.argmin(rests))], np.std([[one.value for one in numbers] for numbers in alike], axis=0)
+
+
+def _motions(velocity: Numbers, width: int) -> Numbers:
+    """Samples of each motion in one direction, (k,), by the mean of a velocity over so many."""
+    turns = np.flatnonzero(np.diff(np.sign(smoothed(velocity, width)))) + 1
+    return np.diff([0, *turns, len(velocity)]).astype(np.float64)
 
 
 def _between(one: FrictionNumber, before: FrictionNumber, after: FrictionNumber) -> FrictionNumber:
@@ -179,7 +233,7 @@ def _between(one: FrictionNumber, before: FrictionNumber, after: FrictionNumber)
 def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Friction, int]:
     """The fit with the shift of the effort, samples, that leaves least unexplained; else 0, or the shift that was seen.
 
-    It must leave much less than 0 does, which the law of friction may do; of what was seen, clearly less.
+    It must leave much less than 0 does, or clearly less, and hardly anything; of what was seen, clearly less.
     """
     step, best = max(1, most // 4), seen
     fits = {seen: fit(seen)}
@@ -189,7 +243,8 @@ def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Fri
                 fits[shift] = fit(shift)
         nearest = min(fits, key=lambda shift: fits[shift].residual)
         step, best = (step if nearest != best and step > 1 else step // 2), nearest
-    share = SHAFT.better if seen else SHAFT.much_better
+    is_left = fits[best].residual > SHAFT.late * abs(fits[best].dynamic.value)
+    share = SHAFT.much_better if is_left and not seen else SHAFT.better
     best = best if fits[best].residual < share * fits[seen].residual else seen
     return fits[best], best
 

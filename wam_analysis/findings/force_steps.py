@@ -130,6 +130,7 @@ def step_section(recording: AnalysedRecording) -> Section | None:
             name = f"{step.label}, {shown(step.commanded, unit)} at {step.begin:.1f} s"
             response = step.response
             settled = ", without staying within 5 % of it" * math.isinf(response.settling)
+            settled += ", still changing at the end" * (bool(settled) and math.isnan(response.rise))
             settled += ", without a lasting rise in its last stretch without a gap" * math.isnan(response.settling)
             came = f"a step from {shown(step.before, unit)}{settled}"
             sentences.append(f"{name}: {'commanded from the beginning' if math.isnan(step.before) else came}.")

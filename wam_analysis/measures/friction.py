@@ -17,6 +17,11 @@ class FrictionNumber(NamedTuple):
     error: float = math.nan
 
     @property
+    def relative(self) -> float:
+        """Error as a part of the number, at most 1."""
+        return self.error / abs(self.value) if self.error < abs(self.value) else 1.0
+
+    @property
     def is_sure(self) -> bool:
         """Whether a number that has to be above zero is identified."""
         return self.value > 0.0 and self.error < SHAFT.unsure * self.value
@@ -33,7 +38,7 @@ class FrictionNumber(NamedTuple):
 
 
 UNKNOWN = FrictionNumber()
-_Fitted = tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]  # factors, errors, rms and share of the rest
+_Fitted = tuple[tuple[float, ...], tuple[float, ...], float]  # factors, errors, rms of the rest
 
 
 class Friction(NamedTuple):
@@ -53,7 +58,8 @@ class Friction(NamedTuple):
     offset : torque that does not change its sign.
     breakaways : their number.
     residual : rms of the averaged torque that the fit in motion leaves.
-    unexplained : the same as a share of the rms of that torque about its mean.
+    factors : of the load.
+    unexplained : rms of that and of what the average leaves out, as a share of the rms of the torque about its mean.
     """
 
     static: FrictionNumber = UNKNOWN
@@ -62,6 +68,7 @@ class Friction(NamedTuple):
     inertia: FrictionNumber = UNKNOWN
     offset: float = math.nan
     breakaways: int = 0
+    factors: tuple[float, ...] = ()
     residual: float = math.nan
     unexplained: float = math.nan
 
@@ -118,7 +125,7 @@ def identify_friction(
     steady = acting @ np.nan_to_num(np.array(solution[4:])) + np.nan_to_num(offset.value)
     breakaways = _breakaways(velocity, torque - steady, rest, 2 * half, allowed)
     static, count = _static(*breakaways, dynamic.value, math.hypot(dynamic.error, left[0]), unknown)
-    return Friction(static, dynamic, viscous, inertia, offset.value, count, *left)
+    return Friction(static, dynamic, viscous, inertia, offset.value, count, solution[4:], *left)
 
 
 def _in_motion(
@@ -130,7 +137,7 @@ def _in_motion(
     half: int,
     period: float,
     allowed: Mask,
-) -> _Fitted:
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
     """Dynamic, viscous, inertia, offset and factors of the load by least squares, errors, rms and share of the rest."""
     nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, (math.nan, math.nan))
     triangle = np.pad(np.concatenate([np.arange(1, half + 2), np.arange(half, 0, -1)]).astype(float), 2)
@@ -153,14 +160,16 @@ def _in_motion(
     direction, number = np.where(onward[rows], 1.0, -1.0), load.shape[1]
     columns = np.column_stack([direction, v, acceleration, np.ones(len(rows)), *others[:number]])
     disturbances = np.column_stack([np.empty((len(rows), 0)), *others[number:]])
-    solution, errors, left = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
+    solution, errors, residual = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
+    fast = float(np.std(torque[rows] - wanted))
+    left = residual, math.hypot(residual, fast) / max(float(np.std(torque[rows])), 1e-300)
     scatter = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
     uneven = SHAFT.uneven * abs(solution[0]) / scatter if scatter > 0.0 else math.inf
     return solution, (errors[0], math.hypot(errors[1], uneven), *errors[2:]), left
 
 
 def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half: Rows) -> _Fitted:
-    """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
+    """Least squares without outliers, errors, rms of the rest; a column without information gives NaN.
 
     The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such
     as creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`,
@@ -198,8 +207,7 @@ def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half:
     errors[used] = np.maximum(noisy, _disagreement(a, wanted[keep], half[keep])) / scale[used]
     errors[used] = np.hypot(errors[used], np.linalg.norm(inverse @ (a.T @ waves[keep]), axis=1) / scale[used])
     errors = np.hypot(errors, SHAFT.neglected * found)
-    left = float(np.sqrt(np.mean(rest[keep] ** 2)))
-    return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
+    return tuple(found.tolist()), tuple(errors.tolist()), float(np.sqrt(np.mean(rest[keep] ** 2)))
 
 
 def _distinct(columns: Numbers, width: int) -> list[int]:

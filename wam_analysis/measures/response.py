@@ -45,7 +45,7 @@ def step_response(
     value : (n,), the signal.
     begin : value before the step; NaN where it is not known.
     steady : length of the end that counts as steady, s; less where a part of it still moves one way.  What does so to
-        the end has no rise and has not settled.
+        the end has no rise and no overshoot, and has not settled.
     band : settling band as a part of the step, for example 0.02.
     least : a change that is not larger is no step.
     """
@@ -72,8 +72,9 @@ def step_response(
         settling = math.inf  # what leaves the band in the steady end has not settled, wherever the recording stops
     else:
         settling = max(_between(time, np.abs(part - 1.0), int(outside[-1]), band), 0.0)
-    rise = high - low if is_steady else math.nan
-    return StepResponse(final, ripple, rise, settling, max(float(np.max(part)) - 1.0, 0.0))
+    if not is_steady:
+        return StepResponse(final, ripple, settling=settling)
+    return StepResponse(final, ripple, high - low, settling, max(float(np.max(part)) - 1.0, 0.0))
 
 
 def _end(tail: Numbers, begin: float, band: float) -> tuple[Numbers, bool]:
