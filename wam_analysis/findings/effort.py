@@ -58,6 +58,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         remarks = [_stated(numbers), f"unexplained: {100.0 * found.unexplained:.2f} % of the effort (rms)"]
         if math.isnan(found.inertia.value):
             alone.append(one.label)
+        if math.isfinite(found.static.value):
+            remarks.append(f"near rest, dry friction rises to about {shown(found.static.value, effort)}")
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
         if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
@@ -133,7 +135,7 @@ def friction(source: Source) -> tuple[Friction, float]:
     of the effort unexplained is taken.  In a motion of one frequency inertia and weight are the same, and the
     inertia is NaN; so are viscous friction and lag, and no lag is looked for.
 
-    All is averaged over a short time, or, where a coarse or noisy velocity makes that uncertain or hides a lag, over a long one.
+    All is averaged over a short time, or over a long one where a coarse velocity makes that uncertain or hides a lag.
     """
     some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
     if not some:
@@ -192,8 +194,8 @@ def _friction(unit: str, some: Sequence[Piece], window: float) -> tuple[Friction
     dynamic, viscous, inertia = (
         one._replace(error=math.hypot(one.error, more)) for one, more in zip(found[1:4], doubts.tolist(), strict=True)
     )
-    found = found._replace(dynamic=dynamic, viscous=viscous, inertia=UNKNOWN if one_frequency else inertia)
-    return found, shift * period
+    static = UNKNOWN if law is None else FrictionNumber(dynamic.value + found.factors[-2])
+    return Friction(static, dynamic, viscous, UNKNOWN if one_frequency else inertia, *found[4:]), shift * period
 
 
 def _rise(velocity: Numbers, speed: float, power: float) -> Numbers:

@@ -1,6 +1,7 @@
 """Times of messages on one clock: stamps of a clock that was set, never set, or is not that of other topics."""
 
 import math
+import re
 import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
@@ -69,9 +70,10 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
 
 
 def dates(texts: Iterable[Any]) -> NDArray[Any]:
-    """Times of dates as text, ns since 1970; raises ValueError if one is none."""
+    """Times of dates as text, ns since 1970, also of a day with dots or of none; raises ValueError if one is none."""
     with warnings.catch_warnings(action="ignore"):  # that numpy turns times of a zone to UTC
-        return np.array([str(one).replace(",", ".") for one in texts], "M8[ns]")
+        dotted = [re.sub(r"^(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1", str(one).replace(",", ".")) for one in texts]
+        return np.array([re.sub(r"^(\d\d:)", r"1970-01-01T\1", one) for one in dotted], "M8[ns]")
 
 
 def joined_times(seconds: NDArray[Any], rest: NDArray[Any]) -> NDArray[Any]:
