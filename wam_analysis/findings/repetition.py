@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.foreign.sources import Piece, Source, pieces
+from wam_analysis.foreign.sources import Piece, Source, pieces, rests
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
@@ -79,9 +79,12 @@ def repetition_section(recording: AnalysedRecording) -> Section:
 
 
 def spectrum_section(recording: AnalysedRecording) -> Section:
-    """The strongest lines of each joint and wrench axis, in its longest stretch without a gap."""
+    """The strongest lines of each joint, or of its effort at rest, and of each wrench axis, in its longest stretch."""
     findings, begins = [], []
-    for one, quantity, label in traced(recording.states):
+    efforts = (
+        (one, "effort", f"{one.label} effort") for one in recording.states if "effort" in one.values and rests(one)
+    )
+    for one, quantity, label in (*traced(recording.states), *efforts):
         if (piece := max(pieces(one, quantity), key=lambda part: len(part.time), default=None)) is None:
             continue
         begins.append(CYCLE.episode_cycles / float(np.ptp(piece.time)))
