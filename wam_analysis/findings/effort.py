@@ -21,8 +21,8 @@ RECORD = (
     "and fast, for some ten seconds, while nothing touches the arm."
 )
 FIT = (
-    "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where it fits "
-    "better, a delay. The standard errors include what it does not explain."
+    "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where they fit "
+    "better, a delay, and a rise of friction near rest. The standard errors include what it does not explain."
 )
 NO_FRICTION = "No friction is identified."
 
