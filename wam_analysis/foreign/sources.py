@@ -37,7 +37,7 @@ class Treatment(StrEnum):
     UNFILLED = "the {quantity} is 0 in every message although the position moves; the rate of that is used"
     LATE = "the {quantity} is about {size}, as by a filter; the rate of the position is used"
     SCALED = "the {quantity} is {factor:.3g} times the rate of the position; that rate is used"
-    FROZEN = "the {quantity} stands still in motion in {number} of {of} messages, and then jumps on; they are left out"
+    FROZEN = "the {quantity} is frozen in motion in {number} of {of} messages, and then jumps on; they are left out"
     SPIKES = "the {quantity} jumps away and back {times}, by up to {size}; the mean of its neighbours is used"
     SPARSE = "{quantity} in only {number} of {of} messages"
 
@@ -392,7 +392,7 @@ def _treated(one: Source) -> Source:
 
 
 def _without_jumps(one: Source) -> tuple[dict[str, Numbers], list[Treated]]:
-    """Values without what stands still before a jump, and without jumps of the zero; what of these there is.
+    """Values without what was frozen before a jump, and without jumps of the zero; what of these there is.
 
     Of a joint without a velocity, which comes back, or never moves otherwise, nothing shows that it did not move.
     """
