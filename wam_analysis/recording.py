@@ -42,9 +42,10 @@ class AnalysedRecording:
     """
 
     def __init__(self, bag: Bag, namespace: str = "", given: TopicMap | None = None) -> None:
-        self.bag, self.is_foreign = bag, given is not None
+        self.is_foreign = given is not None
         # of another robot a topic has no meaning by its name
         self.run = recorded_run(Bag(bag.path, {}, {}, {}, {}) if self.is_foreign else bag, namespace)
+        self.bag = bag if self.is_foreign else self.run.bag
         self.given = given or NOTHING_GIVEN
 
     @property

@@ -112,8 +112,8 @@ SENTENCES: Final = {  # by cause
     "(limits.free_travel); the arm holds its position; end the command, bring the arm to the surface, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + KEEPS_PRESSING,
-    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:z.2f} {unit} have been measured for "
-    "{time:b} s; {reach}",
+    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but {measured:z.2f} {unit} are measured; the force has "
+    "been wrong by more than {allowed:b} {unit} for {time:b} s; {reach}",
     "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
     "{measured:z.2f} {unit} are measured, {desired:.3g} {unit} are commanded; perhaps the surface moves, something "
     "else pushes, or the friction of the surface has changed its direction",
@@ -125,8 +125,9 @@ SENTENCES: Final = {  # by cause
     "{allowed:g}); perhaps it acts elsewhere{hidden}, or a second force acts; correct the contact position{dither}, or "
     "free the arm",
     "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}); "
-    "perhaps a second force acts, or the friction of the surface has changed its direction; command the force again",
-    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N ({limit}); the arm "
+    "perhaps a second force acts, or the friction of the surface has changed its direction; lift off, then command the "
+    "force again",
+    "pushed": "a force of at least {force:b} N acts on the arm; allowed: {allowed:b} N ({limit}); the arm "
     "moves away, by at most limits.free_travel",
     "joint_end": "{joint} stops at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad; command another "
     "posture or direction",
@@ -159,7 +160,7 @@ LOADED: Final = "declare the load (arm.payload); if the tool carries none, "  # 
 TURNED: Final = "in the frame of a link the force turns with it"
 SINCE: Final = ("without reaching it", "since the force was last within its tolerance")
 REACH: Final = (
-    "nothing is touched; bring the arm to the surface first, or command more force",
+    "hardly anything is touched; bring the arm to the surface first, or command more force",
     "command a force that the arm can reach",
     f"the arm is pulled, or carries a load that is not in its model; {PARTS['resting'][1]}",
 )
@@ -220,7 +221,8 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     push, ago = values.get("push"), values.get("ago", 0.0)
     acts = f"acted until {ago:.2f} s before" if ago else "acts"
     calm = NO_DITHER * (values.get("dither", 0.0) > 0.0) + "hold the surface still, or lower force_gain"
-    is_pulled = values.get("measured", 0.0) <= -values.get("allowed", math.inf)
+    along = math.copysign(1.0, values.get("desired", 1.0))
+    is_pulled = along * values.get("measured", 0.0) <= -values.get("allowed", math.inf)
     found = {
         "travel": f"{abs(way):.3g} m {'against' if way < 0.0 else 'along'}",
         "since": SINCE[values.get("has_settled", 0.0) > 0.0],

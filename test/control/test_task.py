@@ -376,7 +376,7 @@ def refused(task: TaskCommand, q: list[float] = POSE) -> str:
 def test_axes_that_contradict_each_other_share_the_way_and_are_reported() -> None:
     world = Springs()
     y = float(BODY.point(POSE, COVER, (PLACE, 0.0, 0.0))[1])
-    world.step(base(position(y, Y), position(y + 0.06, Y, PLACE + 1e-3)), 300)
+    world.step(base(position(y, Y), position(y + 0.06, Y, PLACE + 1e-3)), 150)
     assert BODY.point(world.q, COVER, (PLACE, 0.0, 0.0))[1] - y == pytest.approx(0.03, abs=4e-3)
     assert [event.code for event in world.loop.events] == [Code.NOT_REACHED] * 2 or len(world.loop.events) == 1
     assert world.loop.event.code is Code.NOT_REACHED

@@ -145,7 +145,7 @@ steps:
     ("seconds", "command", "report"),
     [
         (0.4, "torque: [0, 0, 0, 50]", "s: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
-        (3.0, "torque: [0, 0, 0, 2]", "s: torque of joint 4: 2 N m are commanded, but 0.00 N m have been measured"),
+        (3.0, "torque: [0, 0, 0, 2]", "s: torque of joint 4: 2 N m are commanded, but 0.00 N m are measured"),
         (3.0, "force: {frame: outer_link, newtons: [0, -4, 0]}", "s: force along (0, -1, 0): 4 N are commanded, but"),
         (
             0.4,

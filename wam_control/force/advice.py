@@ -65,6 +65,9 @@ def tries(
     (force,) = task.axes
     place = places[0][1]
     pinned = place._replace(position_sd=own.contact_position_sd, is_pinned=True, is_known=True)
+    # where nobody knows yet where it acts, a position helps if it does so anywhere
+    whole = axes.forces.covers.length_of(place.cover) if place.cover else 0.0
+    pins = (place.position,) if place.is_known else (place.position, *(part * whole for part in FORCE.pins))
 
     def is_obeyed(pose: Sequence[float], where: Sequence[tuple[float, ForcePlace]], size: float) -> bool:
         tried = task._replace(axes=(force._replace(value=size),))
@@ -72,8 +75,12 @@ def tries(
         return FORCE.hysteresis * believe(pose, on_links).doubt <= own.limits.doubt
 
     size = force.value or 0.0
-    is_good = not place.is_pinned and is_obeyed(q, [(1.0, pinned)], size)  # first, as a refusal advises it at once
-    yield {"pin": place.position} if is_good else {"no_pin": 1.0}
+    is_good = False
+    for at in pins * (not place.is_pinned):  # first, as a refusal advises it at once
+        if is_good := is_obeyed(q, [(1.0, pinned._replace(position=at))], size):
+            break
+        yield {}
+    yield {"pin": at} if is_good else {"no_pin": 1.0}
     for name, was, angle, pose in _turned(q, joints, own.limits.joint_margin):
         is_good = is_obeyed(pose, places, size)
         yield {"turn": name, "turn_from": was, "turn_to": angle} if is_good else {}

@@ -26,6 +26,7 @@ class CommandedAxis(NamedTuple):
     direction, in_frame : towards what is touched, in the base frame and in that of the command (3,); zeros of a joint.
     desired : size of the force, N; torque of a joint, N m; 0 for a motion.
     at : position along it, m or rad.
+    jacobian : of the point of a motion (3, n); None of others.
     sensed, place : how its force is measured, and where it acts; None for a motion or a joint.
     """
 
@@ -37,6 +38,7 @@ class CommandedAxis(NamedTuple):
     at: float
     sensed: ForceAxis | None = None
     place: ForcePlace | None = None
+    jacobian: Array | None = None
 
     @property
     def is_force(self) -> bool:
@@ -125,8 +127,9 @@ class TaskAxes:
         point = np.array([place.position, *self.forces.covers.aside(place.cover, place.position)])
         at = float(direction.dot(self._body.point(q, place.cover, point)))
         if not axis.is_sensed:
-            along: Array = direction.dot(self._body.point_jacobian(q, place.cover, point))
-            return CommandedAxis(axis, along, direction, in_frame, 0.0, at)
+            jacobian = self._body.point_jacobian(q, place.cover, point)
+            along: Array = direction.dot(jacobian)
+            return CommandedAxis(axis, along, direction, in_frame, 0.0, at, jacobian=jacobian)
         others: list[Array] = []
         for k, each in enumerate(torques):
             # two axes at one position are parts of one force, whose friction is that of `sensed` already

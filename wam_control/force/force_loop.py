@@ -32,6 +32,7 @@ from wam_control.force.limits import (
     calm,
     followed,
     joint_bounds,
+    reachable,
     resolution,
     servo_yielding,
     yielding,
@@ -362,7 +363,13 @@ class ForceLoop:
             speeds = [0.0] * len(speeds)
         run.delayed = [*run.delayed, speeds][-own.delay_samples - 1 :]
         late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)
-        return [VelocityRow(one.now.along, speed) for one, speed in zip(run.axes, late, strict=True)]
+        rows = [VelocityRow(one.now.along, speed) for one, speed in zip(run.axes, late, strict=True)]
+        forces = [row for row, one in zip(rows, run.axes, strict=True) if one.now.is_force]
+        most = own.task.fastest(False)[0]
+        return [
+            row if (jacobian := one.now.jacobian) is None else reachable(row, jacobian, forces, most)
+            for row, one in zip(rows, run.axes, strict=True)
+        ]
 
     def _speed(self, one: AxisRun, dt: float) -> float:
         """Commanded speed along one axis, m/s or rad/s."""

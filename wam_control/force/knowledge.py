@@ -59,14 +59,16 @@ class Knowledge(NamedTuple):
         for chance, other in others:
             there = self._as_placed(other)
             # a harder press shows which link it is
-            apart = there.force - known.force if known.force >= axis.desired else 0.0
+            apart = there.force - known.force if known.force >= axis.desired - known.tolerance else 0.0
             variance += chance * (there.sd**2 + probability * apart**2)
         return known._replace(errors=known.errors._replace(place=math.sqrt(variance)))
 
     def _whole(self, q: Angles, axis: CommandedAxis) -> Belief:
         """What is known of a force, with the errors that the whole commanded force will have."""
         known, place = self._as_placed(axis), axis.place
-        if place is None or place.is_pinned or place.is_touched or not axis.desired or known.force >= axis.desired:
+        if place is None or place.is_pinned or place.is_touched or not axis.desired:
+            return known
+        if known.force >= axis.desired - known.tolerance:
             return known
         if abs(float(axis.direction.dot(self.forces.link_axis(q, place.cover)))) > STEEPEST:
             return known  # nor will it be known

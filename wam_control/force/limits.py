@@ -8,6 +8,7 @@ import numpy as np
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import Angles, ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.problem import VelocityRow, unlimited
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
 from wam_description.rigid_body import Array, RigidBody
@@ -32,6 +33,25 @@ def joint_bounds(
     ends = zip(joints.lower, q, joints.upper, before, strict=True)
     each = [(-towards(at - lower), towards(upper - at), last) for lower, at, upper, last in ends]
     return [min(max(v - step, a), b) for a, b, v in each], [min(max(v + step, a), b) for a, b, v in each]
+
+
+def reachable(row: VelocityRow, jacobian: Array, held: Sequence[VelocityRow], most: float) -> VelocityRow:
+    """The velocity along an axis with which its point is no faster than allowed, and which is zero at a singular pose.
+
+    Near that, the joints would move fast for it, and jump as they pass.
+
+    Parameters
+    ----------
+    row : commanded.
+    jacobian : of the point (3, n).
+    held : rows of the forces, along which it does not move the arm.
+    most : speed of the point, m/s.
+    """
+    per_speed = unlimited([row._replace(speed=1.0), *(one._replace(speed=0.0) for one in held)], 0.0 * row.along)
+    lever = 1.0 / length(per_speed)
+    near = (lever / (FORCE.singular * largest_lever(jacobian))) ** 3
+    speed = length(jacobian.dot(per_speed)) * abs(row.speed) + FORCE.negligible
+    return row._replace(speed=min(near, most / speed, 1.0) * row.speed)
 
 
 def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:

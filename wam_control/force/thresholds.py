@@ -51,7 +51,9 @@ class ForceThresholds:
     slowed: float = 0.5  # of the speed along the force, from then on; twice at most
     lasting: float = 0.2  # s, for which a push is reported after the last time
     stopped: float = 0.5  # of the velocity without limits, below which a joint is at its end
+    singular: float = 0.14  # of the largest lever of a point: a motion with a smaller one is slowed down
     # advice
+    pins: tuple[float, ...] = (0.8, 0.6, 0.3)  # of a link, where a force is tried whose place is not known
     more: tuple[float, ...] = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
     turned: tuple[float, ...] = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)  # rad, by which a joint is turned
     spare: float = 0.1  # rad, from where a joint may be no further: the arm moves on as it presses
