@@ -241,7 +241,7 @@ class StreamThresholds:
     exact: int = 1000  # ns: waits that differ by less are one
     steps: int = 64  # from stamp to stamp, from which a rate is known
     changes: float = 1.5  # periods: a step that is longer lacks a message, and a period that is longer is another one
-    regular: float = 0.5  # of the steps, within `pace` of whole periods: with fewer no message is known to be missing
+    regular: float = 0.6  # of the steps, within `pace` of whole periods: with fewer no message is known to be missing
     relayed: float = 0.6  # of the messages: so many change at most where each comes again
     evenly: float = 0.9  # of the changes of a signal: so many are as far apart, if it is held over between them
     counts: float = 2.0  # smallest changes: those of an encoder are mostly smaller
