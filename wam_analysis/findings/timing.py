@@ -76,6 +76,9 @@ def timing_section(recording: AnalysedRecording) -> Section:
                 Finding(f"{name}: reception jitter", "ms", 1e3 * float(np.std(usual)), note="standard deviation"),
                 Finding(f"{name}: longest gap between receptions", "s", float(np.max(waits))),
             ]
+            late = float(np.median(received - stamp))
+            if abs(late) < STREAM.reset:  # else they are of two clocks
+                findings.append(Finding(f"{name}: delay of the receptions", "ms", late / 1e6))
             levels = np.linspace(0.05, 0.95, STREAM.parts)
             at, passed = (np.quantile(each - each[0], levels) for each in (received, stamp))
             (speed, _), ((variance, _), _) = np.polyfit(at, passed, 1, cov=True)  # delays that change are on no line
