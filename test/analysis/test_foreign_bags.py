@@ -631,21 +631,23 @@ def recorded_late(effort: Any, how: float) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("how", "drag", "weight"),
+    ("how", "drag", "weight", "count", "rise"),
     [
-        (0, 0.4, WEIGHT),
-        (20.0, 0.0, WEIGHT),
-        (10.0, 0.0, WEIGHT),
-        *((how, 0.0, w) for how in (2, 4, 6) for w in (0, WEIGHT)),
+        (0, 0.4, WEIGHT, 0, 0),
+        *((how, 0.0, WEIGHT, 0, 0) for how in (10.0, 20.0)),
+        (0, 0.0, 0.0, 2.0 * np.pi / 2**12, 0),
+        (0, 0.0, 0.0, 0, 0.9),
+        *((how, 0.0, w, 0, 0) for how in (2, 4, 6) for w in (0, WEIGHT)),
     ],
 )
 def test_an_effort_that_lags_or_holds_a_drag_gives_the_friction_all_the_same(
-    how: float, drag: float, weight: float, tmp_path: Path
+    how: float, drag: float, weight: float, count: float, rise: float, tmp_path: Path
 ) -> None:
     time = times(40.0)
     q, v, a = swung(time, 81, WAVES if weight else ((0.8, 0.3), (0.2, 1.2)))
-    effort = loaded(q, v, a, weight, 82) + drag * v * np.abs(v)
-    states = {"position": q, "velocity": v, "effort": recorded_late(effort, how)}
+    effort = loaded(q, v, a, weight, 82) + drag * v * np.abs(v) + rise * np.sign(v) * np.exp(-((v / 0.2) ** 2))
+    motion = {"position": count * np.rint(q / count)} if count else {"position": q, "velocity": v}
+    states = motion | {"effort": recorded_late(effort, how)}
     sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
     analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
     planted = {"j: dry friction": DRY, "j: viscous friction": VISCOUS, "j: inertia": INERTIA}

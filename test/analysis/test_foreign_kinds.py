@@ -389,7 +389,13 @@ def zeros() -> list[Case]:
         (by_mcap_ros2, 100.0, 0.06, ()), (by_rosbags, 125.0, 0.15, ("velocity",)), (sqlite, 500.0, -0.1, ("velocity",)),
     ]  # fmt: skip
     away = one("/joint_states", 100.0, 0.7, 0.5, lambda q: q + 0.3 * (np.arange(len(q)) % 900 == 500))
+    frozen = one("/drive/status", 100.0, 0.7, 0.5, lambda q: np.where(np.arange(len(q)) // 30 == 40, q[1200], q))
+    grips = 0.04 * (np.arange(1500) // 250 % 2) + 2e-5 * np.random.default_rng(6).normal(size=1500)
     return [
+        *(Case(f"a frozen encoder {lacks}", sqlite, without(frozen, lambda _: True, *lacks),
+               {"a: frequency": 0.7} | FRICTION, "is frozen in motion in 29 of 3000") for lacks in ((), ("velocity",))),
+        Case("a gripper comes back", ros1, joints("/g", np.arange(1500) / 50.0, ["a"], position=grips[:, None]),
+             {"a: motions": 5.0}),
         Case("there and back", sqlite, away, sine(0.7, 0.5) | FRICTION, "the position jumps away and back 3 times"),
         *(Case(f"{by:g}", write,
                without(one("/joint_states", rate, 0.7, 0.5, moved(12.5, by, rate)), lambda _: True, *lacks),
@@ -611,6 +617,7 @@ TABLES = {
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "rounded": Written(times=lambda time: math.floor(time / 0.003) * 0.003),
     "dates": Written(times=date),
+    "a day with dots": Written(times=lambda time: f"{date(time)[8:10]}.05.2024 {date(time)[11:]}"),
     "dates of a zone": Written(times=lambda time: f"{date(time)}+02:00"),
     "dates of two zones": Written(times=lambda time: f"{date(time)}Z" if time < 9 else f"{date(time - 3600)}-01:00"),
     "hours": Written(("time [h]", *WITH_UNITS[1:]), (3600.0, *OTHER_UNITS[1:])),

@@ -382,6 +382,17 @@ def test_axes_that_contradict_each_other_share_the_way_and_are_reported() -> Non
     assert world.loop.event.code is Code.NOT_REACHED
 
 
+@pytest.mark.parametrize("value", [TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, X, 0.05), position(1.0, X)])
+def test_a_motion_slows_down_and_stops_at_the_end_of_the_reach(value: TaskAxis) -> None:
+    world, tips = Springs([0.0, -1.8, 0.0, 1.2]), []
+    for _ in range(1200):
+        world.step(base(value))
+        tips.append(BODY.point(world.q, COVER, (PLACE, 0.0, 0.0)))
+    speeds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / DT
+    assert np.max(speeds) < 1.5 * OWN.task.speed_limit
+    assert speeds[-1] < 0.02
+
+
 def test_a_force_without_a_lever_is_refused() -> None:
     straight = [0.0, -1.0, 0.0, math.pi / 2.0]
     x, y, z = BODY.cover_pose(straight, COVER).rotation[:, 0].tolist()

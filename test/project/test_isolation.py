@@ -6,25 +6,13 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from wam_ros.limits import TEST_LIMITS
-from wam_ros.network import PORTS, is_inhabited
+from wam_ros.network import is_inhabited
 from wam_ros.testing import locked_domain
-
-LINUX_GIVES = range(32768, 61000)  # ports, to any program; /proc/sys/net/ipv4/ip_local_port_range
 
 
 @pytest.mark.parametrize("package", sorted(path.name for path in ROOT.glob("wam_*") if path.is_dir()))
 def test_the_tree_is_tested_and_not_an_installed_copy(package: str) -> None:
     assert importlib.import_module(package).__path__ == [str(ROOT / package)]
-
-
-def test_domains_of_the_tests_are_none_that_a_user_takes() -> None:
-    assert min(TEST_LIMITS.domains) > 101  # the most that ROS recommends to users
-    for domain in (TEST_LIMITS.domains[0], TEST_LIMITS.domains[-1]):
-        ports = range(7400 + PORTS * domain, min(7400 + PORTS * (domain + 1), 65536))
-        assert ports[0] not in LINUX_GIVES
-        assert ports[-1] not in LINUX_GIVES
-        assert len(ports) > 2 * 32  # two for each participant
 
 
 def test_every_port_of_a_domain_is_looked_at_and_no_other(tmp_path: Path) -> None:
