@@ -235,25 +235,48 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
 
 
 def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
-    """The paths of trajectories, straight between their points, each until the next one begins."""
+    """The paths of trajectories, each until the next one begins.
+
+    They are straight between the points, or cubic where these have velocities, as ros2_control interpolates them.
+    """
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
     groups, times, held = list[Any](), [np.zeros(0, np.int64)], list[Numbers]()
     for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
         points, names = message.points, tuple(map(str, message.joint_names))
         knots = [begin + _whole(point.time_from_start) for point in points]
+        if not points:
+            continue
         fields = [np.array([getattr(one, own) for one in points], np.float64).reshape(len(points), -1)
                   for own in OF_POINT.values()]  # fmt: skip
         if [one.shape[1:] for one in held] == [one.shape[1:] for one in fields] and knots[0] > begin:
             knots, fields = [begin, *knots], [np.vstack(pair) for pair in zip(held, fields, strict=True)]
-        first, last = min(knots, default=end), end if math.isfinite(end) else max(knots, default=begin)
-        at = np.unique([*knots, *np.arange(first, last, PATH_STEP)])
+        at = np.unique([*knots, *np.arange(knots[0], end if math.isfinite(end) else knots[-1], PATH_STEP)])
+        if not np.any(at < end):  # it was replaced before its first point
+            held = [field[:1] for field in fields]
+            continue
         at = at[at < end]
-        taken = [np.array([np.interp(at, knots, one) for one in field.T]).reshape(-1, len(at)).T for field in fields]
+        position, velocity, effort = fields
+        taken = [_spline(at, np.array(knots), position, velocity)]
+        taken += [_spline(at, np.array(knots), field, np.zeros(0)) for field in (velocity, effort)]
         held = [field[-1:] for field in taken]
         groups.append((np.arange(len(at)) + sum(map(len, times)), (at, message.header.frame_id, names, taken)))
         times.append(at)
     return joint_columns(np.concatenate(times), groups)
+
+
+def _spline(at: Times, knots: Times, value: Numbers, rate: Numbers) -> Numbers:
+    """Values (k, n) at some instants (m,), ns, cubic for their rates (k, n), 1/s, or straight without; then (m, n)."""
+    row = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, max(len(knots) - 2, 0))
+    after = np.minimum(row + 1, len(knots) - 1)
+    wait = (knots[after] - knots[row])[:, np.newaxis]
+    part = np.clip((at - knots[row])[:, np.newaxis] / np.maximum(wait, 1), 0.0, 1.0)
+    rise = value[after] - value[row]
+    if rate.shape != value.shape:
+        return np.asarray(value[row] + part * rise, np.float64)
+    first, last = (wait / BILLION * rate[rows] - rise for rows in (row, after))  # off the straight line
+    bend = part * (1.0 - part) * ((1.0 - part) * first - part * last)
+    return np.asarray(value[row] + part * rise + bend, np.float64)
 
 
 def _whole(stamp: Any) -> int | None:
