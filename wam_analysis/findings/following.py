@@ -31,7 +31,7 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                 remarks.append(_words(found, unit))
                 numbers |= {"error, rms": (found.rms, unit), "largest error": (found.largest, unit)}
             if found and found.unexplained < SHAFT.agree:
-                numbers |= {"gain": (found.gain, ""), "delay": (found.delay, "s")}
+                numbers |= {"gain": (found.gain, ""), "delay": (found.delay, "s"), "offset": (found.offset, unit)}
                 numbers |= {"play": (found.play, unit)} if found.play else {}
             if steps:
                 worst = max(steps, key=lambda step: step.error)
@@ -54,8 +54,9 @@ def _words(found: Following, unit: str) -> str:
         left = shown(100.0 * found.unexplained, "%")
         return f"a gain and a delay do not explain {left} of how it follows its command; {error}"
     play = f" and a play of {shown(found.play, unit)}" * bool(found.play)
+    off = f", and is off by {shown(found.offset, unit)}" * (abs(found.offset) > SHAFT.agree * found.largest)
     when = f"{shown(abs(found.delay), 's')} {'after' if found.delay >= 0.0 else 'before'} its command"
-    return f"follows {when}, with a gain of {shown(found.gain)}{play}; {error}"
+    return f"follows {when}, with a gain of {shown(found.gain)}{play}{off}; {error}"
 
 
 def _following(measured: Source, command: Source) -> Following | None:

@@ -18,7 +18,7 @@ class Following(NamedTuple):
     Attributes
     ----------
     rms, largest : error, in the unit of the signal.
-    gain, delay : the signal is `gain` times the command of `delay` s before, and a constant.
+    gain, delay, offset : the signal is `gain` times the command of `delay` s before, and a constant.
     play : by which the command moves after it turned until the signal does, 0 where that does not show.
     unexplained : rms of what these leave, over that of the motion.
     """
@@ -27,6 +27,7 @@ class Following(NamedTuple):
     largest: float
     gain: float
     delay: float
+    offset: float
     play: float
     unexplained: float
 
@@ -37,6 +38,7 @@ class _Fit(NamedTuple):
     rest: float
     delay: float
     gain: float
+    offset: float
 
 
 def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> Following:
@@ -53,7 +55,7 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     error = min((value - np.interp(time, *path) for path in paths), key=lambda one: float(one @ one))
     rms, largest = math.sqrt(np.mean(error**2)), float(np.max(np.abs(error)))
     some = slice(None, None, math.ceil(len(time) / CYCLE.compared))
-    time, value = time[some], value[some] - np.mean(value[some])
+    time, value = time[some], value[some]
     motion = float(np.std(value)) or math.inf
     fits = [_searched(time, value, *path) for path in paths]
     is_held = fits[1].rest < SHAFT.much_better * fits[0].rest
@@ -69,8 +71,8 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     play = 0.5 * (low + high)
     loose = with_play(play)
     if loose.rest < SHAFT.much_better * fit.rest:
-        return Following(rms, largest, loose.gain, loose.delay, play, loose.rest / motion)
-    return Following(rms, largest, fit.gain, fit.delay, 0.0, fit.rest / motion)
+        return Following(rms, largest, loose.gain, loose.delay, loose.offset, play, loose.rest / motion)
+    return Following(rms, largest, fit.gain, fit.delay, fit.offset, 0.0, fit.rest / motion)
 
 
 def _played(path: Numbers, play: float) -> Numbers:
@@ -100,10 +102,11 @@ def _searched(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
 
 
 def _fit(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers, delay: float) -> _Fit:
-    """The fit for one delay; the mean of the signal is 0."""
+    """The fit for one delay."""
     path = np.interp(time - delay, stamps, sent)
-    path = path - np.mean(path)
-    power = float(path @ path)
-    gain = float(path @ value) / power if power else 0.0
-    rest = value - gain * path
-    return _Fit(math.sqrt(float(rest @ rest) / len(rest)), delay, gain)
+    middle, level = float(np.mean(path)), float(np.mean(value))
+    power = float((path - middle) @ (path - middle))
+    gain = float((path - middle) @ value) / power if power else 0.0
+    offset = level - gain * middle
+    rest = value - gain * path - offset
+    return _Fit(math.sqrt(float(rest @ rest) / len(rest)), delay, gain, offset)
