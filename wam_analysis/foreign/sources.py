@@ -398,10 +398,8 @@ def _without_jumps(one: Source) -> tuple[dict[str, Numbers], list[Treated]]:
     """
     values, treated = dict(one.values), []
     at, moves = _jumps(one)
-    shown = values.get("position", at)[row_at(one.time, at)]
-    frozen = [
-        (first, after) for after in np.flatnonzero(moves).tolist() if (first := _frozen(at, shown, after)) < after
-    ]
+    shown = one.only("position", "velocity")
+    frozen = [(first, after) for after in np.flatnonzero(moves).tolist() if (first := _frozen(shown, after)) < after]
     for first, after in frozen:
         moves[after] = 0.0
         begin, end = row_at(one.time, at[[first, after]])
@@ -423,16 +421,22 @@ def _without_jumps(one: Source) -> tuple[dict[str, Numbers], list[Treated]]:
     return values, treated
 
 
-def _frozen(time: Numbers, position: Numbers, after: int) -> int:
-    """First of the rows of one value before a jump by what was moved meanwhile; the jump's where there are none."""
+def _frozen(shown: Source, after: int) -> int:
+    """First of the rows of one position before a jump by what was moved meanwhile; the jump's where there are none.
+
+    That is moved by the velocity, if it does not repeat, too, or by the positions before and after.
+    """
+    time, position = shown.time, shown.values["position"]
+    velocity = shown.values.get("velocity", np.zeros(len(time)))
     first = int(np.max(np.flatnonzero(np.diff(position[:after])), initial=-1)) + 1
     near = STREAM.around
     if after - first < SHAFT.rest_samples or first < near or after + near >= len(time):
         return after
     rates = [(position[row] - position[row - near]) / (time[row] - time[row - near]) for row in (first, after + near)]
-    jump = position[after] - position[first]
-    moved = float(np.mean(rates)) * (time[after] - time[first])
-    return first if abs(jump - moved) < SHAFT.much_better * abs(jump) else after
+    jump, during = position[after] - position[first], slice(first, after + 1)
+    ways = [float(np.mean(rates)) * (time[after] - time[first]), float(np.sum(_moved(time[during], velocity[during])))]
+    repeats = velocity[first] != 0.0 and not np.ptp(velocity[first:after])
+    return first if repeats or min(abs(jump - way) for way in ways) < SHAFT.much_better * abs(jump) else after
 
 
 def _spikes(value: Numbers, least: float) -> Index:
