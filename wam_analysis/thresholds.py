@@ -102,7 +102,7 @@ class CycleThresholds:
     near_harmonic: float = 0.1
     lines: int = 3  # of a spectrum, that are reported
     # of a size: a cycle whose second half has less of the first, or more, is reported as changing
-    changing: float = 0.9
+    changing: float = 0.8
     # lines of a spectrum
     # bins on each side at least and at most, half of the frequency, from which the noise is known
     neighbours: tuple[int, int] = (8, 24)

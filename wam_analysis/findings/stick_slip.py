@@ -13,7 +13,7 @@ from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rest
 from wam_analysis.measures.runs import at_rest, runs, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT, STREAM
-from wam_bag.arrays import Numbers
+from wam_bag.arrays import Mask, Numbers
 
 
 def stick_section(recording: AnalysedRecording) -> Section:
@@ -112,6 +112,8 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         shortest = max(shortest, max(least_rows, SHAFT.rest_samples) * piece.period)
         at = np.interp(piece.time, placed.time, positions) if len(positions) else None
         still = without_turns(still, velocity, rest, at, sd, piece.period)
+        if at is not None:
+            still = _with_noise(still, at, SHAFT.passing * rest * piece.period, SHAFT.noisy * sd)
         first = runs(~still)[:, 0]
         goes_on = at is not None and abs(at[0] - place) > rest * (piece.time[0] - ended)  # over a gap, in motion
         place, ended = math.nan if at is None or still[-1] else at[-1], piece.time[-1]
@@ -123,6 +125,16 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         return None
     unmet = disobeyed / resting if command is not None and resting else math.nan
     return Sticking(resting / total, unmet, tuple(begins), shortest, slowest)
+
+
+def _with_noise(still: Mask, position: Numbers, way: float, least: float) -> Mask:
+    """The rests, (n,), with brief motions of the velocity alone: by less than a way per sample, and a least one."""
+    found = still.copy()
+    for begin, end in runs(~still).tolist():
+        moved = float(np.ptp(position[max(begin - 1, 0) : end + 1]))
+        if end - begin < SHAFT.window_samples and moved < way * (end - begin) + least:
+            found[begin:end] = True
+    return found
 
 
 def rest_speed(piece: Piece, least: float) -> float:
