@@ -277,9 +277,9 @@ def follows() -> list[Case]:
         played.append(min(max(played[-1], at - 0.01), at + 0.01))
     steps = np.repeat([0.1, 0.5, -0.3], len(time) // 3)
     risen = steps + np.repeat([0.0, -0.4, 0.8], len(time) // 3) * np.exp(-np.maximum(time % 7.0 - 0.06, 0.0) / 0.2)
-    points = [{"positions": [q], "time_from_start": {"sec": s}} for s, q in ((2, 1.0), (4, 1.0), (9, -0.5))]
+    points = [{"positions": [q], "velocities": [0.0], "time_from_start": {"sec": s}} for s, q in ((2, 1.0), (9, -0.5))]
     trajectory = Sent("/t", TRAJECTORY, 2.0, 2.0, "", {"joint_names": ["a"], "points": points})
-    late = np.interp(time - 2.1, (2.0, 4.0, 9.0), (1.0, 1.0, -0.5)) - 0.03
+    late = 0.22 + 0.75 * np.polynomial.Polynomial([0.0, 1.5, 0.0, -0.5])(np.clip(1.0 - (time - 4.1) / 3.5, -1.0, 1.0))
     force = np.outer(path(time), (0.0, 0.0, 3.0)) + 5.0
     noise = 0.01 * np.random.default_rng(4).normal(size=force.shape)
     return [
