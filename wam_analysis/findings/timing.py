@@ -47,6 +47,8 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
             name += f" of {', '.join(one.name or one.frame for one in those)}"
         stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
         columns: Any = recording.bag.topics[topic]
+        if len(columns.stamp_ns) > recording.bag.counts.get(topic, math.inf):
+            continue  # a path of trajectories
         is_table = np.array_equal(columns.stamp_ns, columns.log_time_ns)  # or messages without stamps
         yield name, stamp, None if is_table else received, math.nan
 

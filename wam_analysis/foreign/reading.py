@@ -29,7 +29,8 @@ FIELDS = {  # of the types that are known: suffix of the topic, and fields by qu
     ],
 }
 COMMAND = "command"
-PATH_STEP = 10_000_000  # ns, of the path of a trajectory
+UNORDERED = "points that go back in time, or lack values of others"  # of a trajectory
+PATH_STEP, PATH_SAMPLES = 10_000_000, 100_000  # ns between those of a trajectory's path, and how many at most
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
 
 
@@ -241,28 +242,36 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
     """
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
-    groups, times, held = list[Any](), [np.zeros(0, np.int64)], list[Numbers]()
+    groups, times, held = list[Any](), [np.zeros(0, np.int64)], dict[tuple[str, ...], list[Numbers]]()
+    wrong = 0
     for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
         points, names = message.points, tuple(map(str, message.joint_names))
-        knots = [begin + _whole(point.time_from_start) for point in points]
         if not points:
             continue
-        fields = [np.array([getattr(one, own) for one in points], np.float64).reshape(len(points), -1)
-                  for own in OF_POINT.values()]  # fmt: skip
-        if [one.shape[1:] for one in held] == [one.shape[1:] for one in fields] and knots[0] > begin:
-            knots, fields = [begin, *knots], [np.vstack(pair) for pair in zip(held, fields, strict=True)]
-        at = np.unique([*knots, *np.arange(knots[0], end if math.isfinite(end) else knots[-1], PATH_STEP)])
+        knots = [begin + _whole(point.time_from_start) for point in points]
+        fields = [[getattr(one, own) for one in points] for own in OF_POINT.values()]
+        if np.any(np.diff(knots) < 0) or any(len({*map(len, field)}) > 1 for field in fields):
+            wrong += 1
+            continue
+        values = [np.array(field, np.float64).reshape(len(points), -1) for field in fields]
+        before = held.get(names, [])
+        if [one.shape[1:] for one in before] == [one.shape[1:] for one in values] and knots[0] > begin:
+            knots, values = [begin, *knots], [np.vstack(pair) for pair in zip(before, values, strict=True)]
+        last = end if math.isfinite(end) else knots[-1]
+        step = max(PATH_STEP, (last - knots[0]) / PATH_SAMPLES)
+        at = np.unique([*knots, *np.arange(knots[0], last, step).astype(np.int64)])
         if not np.any(at < end):  # it was replaced before its first point
-            held = [field[:1] for field in fields]
+            held = {names: [value[:1] for value in values]}
             continue
         at = at[at < end]
-        position, velocity, effort = fields
+        position, velocity, effort = values
         taken = [_spline(at, np.array(knots), position, velocity)]
-        taken += [_spline(at, np.array(knots), field, np.zeros(0)) for field in (velocity, effort)]
-        held = [field[-1:] for field in taken]
+        taken += [_spline(at, np.array(knots), value, np.zeros(0)) for value in (velocity, effort)]
+        held = {names: [value[-1:] for value in taken]}
         groups.append((np.arange(len(at)) + sum(map(len, times)), (at, message.header.frame_id, names, taken)))
         times.append(at)
-    return joint_columns(np.concatenate(times), groups)
+    found = joint_columns(np.concatenate(times), groups)
+    return found._replace(irregular={**found.irregular, UNORDERED: wrong}) if wrong else found
 
 
 def _spline(at: Times, knots: Times, value: Numbers, rate: Numbers) -> Numbers:
