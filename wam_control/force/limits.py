@@ -85,7 +85,7 @@ def approach_speed(
     if is_touching:
         return max((whole + axis.desired * servo_yielding) / sensed.speed_fraction / rise, slowest)
     fastest = limits.impact * axis.desired / math.sqrt(sensed.impact_mass * own.guard.contact_stiffness)
-    if own.is_estimated or not place.is_known:
+    if not place.is_known:
         detected = own.rise_time if own.is_estimated else FORCE.shown * own.latency
         fastest = min(fastest, max(whole / detected, slowest))
     return fastest / sensed.speed_fraction
