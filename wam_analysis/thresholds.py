@@ -47,6 +47,7 @@ class ShaftThresholds:
     hidden: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
     much_better: float = 0.5  # of the rest of a fit: one with a lag leaves less
     better: float = 0.9  # the same of another lag than the reversals show
+    tried_samples: int = 20_000  # of a joint, on which these laws of friction are tried
     stribeck: tuple[float, float, int] = (0.01, 0.4, 12)  # of the largest speed, and how many are tried between
     longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated

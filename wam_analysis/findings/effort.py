@@ -175,7 +175,10 @@ def _friction(unit: str, some: Sequence[Piece], window: float) -> tuple[Friction
     own, noise, curve = _own_acceleration(velocity, sd, loads[:, 1:], rest, width, period)
     one_frequency = bool(weight) and own < SHAFT.apart
     most *= not one_frequency
-    law, spread = _stribeck(velocity, lambda columns: fit(0, None, np.column_stack([loads, columns])), fit(0).residual)
+    tried = np.arange(len(velocity)) < SHAFT.tried_samples  # enough to choose among so many
+    law, spread = _stribeck(
+        velocity, lambda columns: fit(0, tried, np.column_stack([loads, columns])), fit(0, tried).residual
+    )
     if law is not None:
         fit = partial(fit, loads=np.column_stack([loads, law]))
     found, shift = _best(fit, most)
