@@ -13,9 +13,9 @@ import pytest
 from foreign_bags import CONTROLLER, INTERFACES, JOINTS, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
 
 from wam_analysis.findings.analysis import analyse
-from wam_analysis.foreign.reading import TRAJECTORY
 from wam_analysis.foreign.topic_map import topic_map
 from wam_bag.bag import BagError
+from wam_description.topics import TRAJECTORY
 
 NOTHING = topic_map([], [], [], [], [])
 DEGREES = topic_map([], [], [], [], ["position=deg", "velocity=deg/s"])
@@ -263,7 +263,7 @@ def called_as_commands() -> list[Case]:
 
 def follows() -> list[Case]:
     """Joints and a force that follow a path, late, by a part of it, or through a play; and steps."""
-    sent, time = topic_map([], [], ["/cmd"], [], []), np.arange(0.0, 21.0, 0.004)
+    to, time = topic_map([], [], ["/cmd"], [], []), np.arange(0.0, 21.0, 0.004)
 
     def path(at: Any) -> Any:
         return 0.5 * np.sin(1.3 * at) + 0.2 * np.sin(4.1 * at)
@@ -284,15 +284,14 @@ def follows() -> list[Case]:
     noise = 0.01 * np.random.default_rng(4).normal(size=force.shape)
     return [
         Case("late", by_rosbags, joint(path(time), 0.9 * path(time - 0.03)), {"a position: gain": 0.9,
-             "a position: delay": 0.03}, "", sent, ("Shows: a position: follows ",)),
-        Case("play", ros1, joint(path(time), played, 2),
-             {"a position: play": 0.02, "a position: delay": 0.02}, "", sent),
+             "a position: delay": 0.03}, "", to, ("Shows: a position: follows ",)),
+        Case("play", ros1, joint(path(time), played, 2), {"a position: play": 0.02, "a position: delay": 0.02}, "", to),
         Case("steps", sqlite, joint(steps, risen - 0.02), {"a position: largest steady error": 0.02,
-             "a position: median rise time 10-90 %": 0.2 * math.log(9.0)}, "", sent),
+             "a position: median rise time 10-90 %": 0.2 * math.log(9.0)}, "", to),
         Case("a trajectory", by_rosbags, [*joint(late, late)[: len(late)], trajectory],
              {"a position: delay": 0.1, "a position: largest steady error": 0.03}, "", NOTHING, ("/t: 1 message;",)),
         Case("a force", by_mcap_ros2, wrenches("/f", time + 0.05, 0.8 * force + noise) + wrenches("/cmd", time, force),
-             {"/f force.z: gain": 0.8, "/f force.z: delay": 0.05}, "", sent),
+             {"/f force.z: gain": 0.8, "/f force.z: delay": 0.05}, "", to),
     ]  # fmt: skip
 
 

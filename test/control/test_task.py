@@ -383,8 +383,9 @@ def test_axes_that_contradict_each_other_share_the_way_and_are_reported() -> Non
 
 
 @pytest.mark.parametrize("value", [TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, X, 0.05), position(1.0, X)])
-def test_a_motion_slows_down_and_stops_at_the_end_of_the_reach(value: TaskAxis) -> None:
-    world, tips = Springs([0.0, -1.8, 0.0, 1.2]), []
+@pytest.mark.parametrize("pose", [[0.0, -1.8, 0.0, 1.2], [0.0, -math.pi / 2.0, 0.0, math.pi / 2.0]])
+def test_a_motion_slows_down_and_stops_at_the_end_of_the_reach(value: TaskAxis, pose: list[float]) -> None:
+    world, tips = Springs(pose), []
     for _ in range(1200):
         world.step(base(value))
         tips.append(BODY.point(world.q, COVER, (PLACE, 0.0, 0.0)))

@@ -12,11 +12,11 @@ from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS, UNNAMED, joint_columns
+from wam_description.topics import TRAJECTORY
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 INTERFACES = "control_msgs/msg/DynamicJointState"
-TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 POINTS = {"feedback": "", "actual": "", "reference": " command", "desired": " command"}  # of controllers, new and old
 OF_POINT = {"position": "positions", "velocity": "velocities", "effort": "effort"}
 FIELDS = {  # of the types that are known: suffix of the topic, and fields by quantity
@@ -49,13 +49,8 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
         if a topic, joint or field of the map is not there.
     """
     kinds = {source.types[name] for name, number in source.counts.items() if number}
-    read_as_it_is = {
-        JOINTS,
-        WRENCH,
-        CONTROLLER,
-        TRAJECTORY,
-        *([] if JOINTS in kinds else [INTERFACES]),
-    }  # which has the same again
+    same_again = [] if JOINTS in kinds else [INTERFACES]
+    read_as_it_is = {JOINTS, WRENCH, CONTROLLER, TRAJECTORY, *same_again}
     named = (*given.topics, *given.commands)
     chosen = [
         name for name, kind in source.types.items() if name in named or (kind in read_as_it_is and not given.topics)
@@ -243,13 +238,14 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
     groups, times, held = list[Any](), [np.zeros(0, np.int64)], dict[tuple[str, ...], list[Numbers]]()
-    wrong = 0
+    wrong, (frame, *_) = 0, _frames(columns)
     for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
-        points, names = message.points, tuple(map(str, message.joint_names))
+        points, names = getattr(message, "points", ()), tuple(map(str, getattr(message, "joint_names", ())))
         if not points:
             continue
-        knots = [begin + _whole(point.time_from_start) for point in points]
-        fields = [[getattr(one, own) for one in points] for own in OF_POINT.values()]
+        # JSON leaves out what is empty or 0
+        knots = [begin + (_whole(getattr(point, "time_from_start", None)) or 0) for point in points]
+        fields = [[getattr(one, own, ()) for one in points] for own in OF_POINT.values()]
         if np.any(np.diff(knots) < 0) or any(len({*map(len, field)}) > 1 for field in fields):
             wrong += 1
             continue
@@ -265,23 +261,23 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
             continue
         at = at[at < end]
         position, velocity, effort = values
-        taken = [_spline(at, np.array(knots), position, velocity)]
-        taken += [_spline(at, np.array(knots), value, np.zeros(0)) for value in (velocity, effort)]
+        each = ((position, velocity), (velocity, None), (effort, None))
+        taken = [_spline(at, np.array(knots), value, rate) for value, rate in each]
         held = {names: [value[-1:] for value in taken]}
-        groups.append((np.arange(len(at)) + sum(map(len, times)), (at, message.header.frame_id, names, taken)))
+        groups.append((np.arange(len(at)) + sum(map(len, times)), (at, frame, names, taken)))
         times.append(at)
     found = joint_columns(np.concatenate(times), groups)
     return found._replace(irregular={**found.irregular, UNORDERED: wrong}) if wrong else found
 
 
-def _spline(at: Times, knots: Times, value: Numbers, rate: Numbers) -> Numbers:
-    """Values (k, n) at some instants (m,), ns, cubic for their rates (k, n), 1/s, or straight without; then (m, n)."""
+def _spline(at: Times, knots: Times, value: Numbers, rate: Numbers | None) -> Numbers:
+    """Values (k, n) of knots at some instants (m,), ns: cubic with their rates (k, n), 1/s, or straight, (m, n)."""
     row = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, max(len(knots) - 2, 0))
     after = np.minimum(row + 1, len(knots) - 1)
     wait = (knots[after] - knots[row])[:, np.newaxis]
     part = np.clip((at - knots[row])[:, np.newaxis] / np.maximum(wait, 1), 0.0, 1.0)
     rise = value[after] - value[row]
-    if rate.shape != value.shape:
+    if rate is None or rate.shape != value.shape:
         return np.asarray(value[row] + part * rise, np.float64)
     first, last = (wait / BILLION * rate[rows] - rise for rows in (row, after))  # off the straight line
     bend = part * (1.0 - part) * ((1.0 - part) * first - part * last)

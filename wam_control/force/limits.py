@@ -48,7 +48,7 @@ def reachable(row: VelocityRow, jacobian: Array, held: Sequence[VelocityRow], mo
     most : speed of the point, m/s.
     """
     per_speed = unlimited([row._replace(speed=1.0), *(one._replace(speed=0.0) for one in held)], 0.0 * row.along)
-    lever = 1.0 / length(per_speed)
+    lever = 1.0 / max(length(per_speed), FORCE.negligible)  # nothing moves along a direction without a lever
     near = (lever / (FORCE.singular * largest_lever(jacobian))) ** 3
     speed = length(jacobian.dot(per_speed)) * abs(row.speed) + FORCE.negligible
     return row._replace(speed=min(near, most / speed, 1.0) * row.speed)
