@@ -607,7 +607,7 @@ TABLES = {
     "units, renamed": Written(("t [ms]", *WITH_UNITS[1:]), OTHER_UNITS, fields=("stamp=t [ms]",)),
     "decimal commas": Written(delimiter=";", decimal=","),
     "decimal commas in quotes": Written(decimal=","),
-    "separators of thousands": Written(("Time [ms]", *WITH_UNITS[1:]), OTHER_UNITS, ";", times=german),
+    "separators of thousands": Written(("Zeit [ms]", *WITH_UNITS[1:]), OTHER_UNITS, ";", times=german),
     "the delimiter above": Written(delimiter=";", decimal=",", comment="sep=;\n"),
     "two columns": Written(("s", *TITLES, "ns"), fields=("stamp=s,ns",), times=lambda time: int(time) + 50),
     "two columns, us": Written(("s", *TITLES, "us"), fields=("stamp=s,us",), times=int),

@@ -105,6 +105,9 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     if given.topics or given.commands or "name" in given.fields:
         raise ValueError(f"{path} is a table: leave out --topic, --command and --map name. {COMMANDS}")
     _require_once(path, [*map(str, series)])
+    if "stamp" not in given.fields and not _columns(series, "stamp", given):
+        timed = [name for name, unit in map(_split, map(str, series)) if UNITS.get(unit, ("", ""))[1] == "s"]
+        given = given._replace(fields={**given.fields, **{"stamp": name for name in timed if len(timed) == 1}})
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     found |= {quantity: [one for one in found[quantity] if one.name in tuple("xyz")] for quantity in WRENCH}
