@@ -319,11 +319,12 @@ class RunningArm:
             where there is no such service, with a switch or without.
         """
         self._require_start()
-        kind, taken = ("Trigger", "no value") if switch is None else ("SetBool", "True or False")
+        kinds = {"std_srvs/srv/Trigger": "no value", "std_srvs/srv/SetBool": "True or False"}
         found = self.node.get_service_names_and_types()
-        there = [name.removeprefix(f"/{NAMESPACE}/") for name, kinds in found if f"std_srvs/srv/{kind}" in kinds]
-        if service not in there:
-            raise ValueError(f"no service that takes {taken} is named '{service}'; there are {', '.join(there)}")
+        there = {name.removeprefix(f"/{NAMESPACE}/"): kinds[kind] for name, (kind, *_) in found if kind in kinds}
+        require(service in there, f"no service is named '{service}'; there are {', '.join(there)}")
+        taken = there[service]
+        require((taken == "no value") == (switch is None), f"'{service}' takes {taken}")
         node, _, name = service.partition("/")
         client, message = self._client.service(Call(node, name, switch))
         self.run_until(client.service_is_ready)

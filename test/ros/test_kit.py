@@ -190,9 +190,9 @@ def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
 
 def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     arm.enable()
-    for words in (("driver/estp",), ("estop",), ("driver/estop", True), ("driver/enable",)):
-        takes = "True or False" if words[1:] else "no value"
-        with pytest.raises(ValueError, match=f"takes {takes} is named '{words[0]}'; there are .*driver/"):
+    takes = {("driver/estop", True): "'driver/estop' takes no value", ("driver/enable",): "takes True or False"}
+    for words in (("driver/estp",), ("estop",), *takes):
+        with pytest.raises(ValueError, match=takes.get(words, f"is named '{words[0]}'; there are .*driver/")):
             arm.call(*words)
     assert arm.call("driver/estop").success
     with pytest.raises(ArmFault, match="emergency stop"):
