@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, counted, shown
-from wam_analysis.findings.force_steps import force_steps
+from wam_analysis.findings.force import fate_words
+from wam_analysis.findings.force_steps import UNSTABLE, force_steps
 from wam_analysis.findings.repetition import LEAST
 from wam_analysis.foreign.sources import AXES, Source
 from wam_analysis.held_messages import value_changes
@@ -17,7 +18,7 @@ from wam_bag.columns import JOINT_FIELDS
 
 def following_section(recording: AnalysedRecording) -> Section | None:
     """How what was measured follows its command; None where nothing was commanded."""
-    sentences, findings = list[str](), list[Finding]()
+    sentences, findings, wrong = list[str](), list[Finding](), list[str]()
     for one in recording.states:
         if (command := recording.command_of(one)) is None:
             continue
@@ -40,11 +41,19 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                 numbers["largest steady error"] = (worst.error, unit)
                 known = [step.response for step in steps if math.isfinite(step.response.rise)]
                 if known and found is None:  # a path has a rise of its own
+                    overshoot = 100.0 * max(one.overshoot for one in known)
+                    remarks.append(f"the largest overshoot is {shown(overshoot, '%')}")
                     numbers["median rise time 10-90 %"] = (float(np.median([one.rise for one in known])), "s")
-                    numbers["largest overshoot"] = (100.0 * max(one.overshoot for one in known), "%")
+                    numbers["largest overshoot"] = (overshoot, "%")
+                wrong += [
+                    f"{name}, {shown(step.commanded, unit)} at {step.begin:.1f} s: it {fate_words(step.swings)}."
+                    for step in steps
+                    if step.swings.verdict in UNSTABLE
+                ]
             sentences += [f"{name}: {'; '.join(remarks)}."] if remarks else []
             findings += [Finding(f"{name}: {what}", of, value) for what, (value, of) in numbers.items()]
-    return Section("following", "Commands", sentences, findings, sentences) if sentences else None
+    stated = [*sentences, *wrong]
+    return Section("following", "Commands", stated, findings, sentences, wrong) if stated else None
 
 
 def _words(found: Following, unit: str) -> str:

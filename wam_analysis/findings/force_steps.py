@@ -20,6 +20,7 @@ from wam_analysis.thresholds import HOLD, SHAFT, STREAM
 from wam_theory.verdicts import Verdict
 
 FORCE = AXES[:3]
+UNSTABLE = Verdict.DIVERGED, Verdict.LIMIT_CYCLE
 
 
 class ForceStep(NamedTuple):
@@ -70,15 +71,15 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     is_held[0] = True
     stretches = pieces(measured)
     got = np.column_stack([measured.values[axis][known] for axis in axes])
-    wanted = desired[row_at(command.time, measured.time[known])]
-    middle = wanted.mean(axis=0) if np.any(wanted != wanted[0]) else 0.0
-    sign = 1.0 if measured.is_joint else np.sign(np.sum(got * (wanted - middle))) or 1.0
+    sent = desired[row_at(command.time, measured.time[known])]
+    middle = sent.mean(axis=0) if np.any(sent != sent[0]) else 0.0
+    sign = 1.0 if measured.is_joint else np.sign(np.sum(got * (sent - middle))) or 1.0
     found, held = [], np.flatnonzero(is_held)
     for left, part in zip([0, *held + 1], held, strict=False):
         row, begin = edges[part], max(float(at[part]), float(measured.time[0]))
         end = min(at[part + 1], command.leaves(begin), measured.leaves(begin))
-        since, was = at[left], desired[edges[left] - 1] * (left > 0)
-        change = desired[row] - was
+        since, was, wanted = at[left], desired[edges[left] - 1] * (left > 0), desired[edges[part + 1] - 1]
+        change = wanted - was
         size = float(np.linalg.norm(change))
         if size <= least or command.arrives[row] or end - begin < HOLD.shortest:
             continue
@@ -91,7 +92,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
             if np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
             time, reached = piece.time[after] - begin, value[after]
-            away, to = (float(one @ way) for one in (was, desired[row]))
+            away, to = (float(one @ way) for one in (was, wanted))
             start = float(np.mean(before)) if len(before) else math.nan
             is_first = not row and is_known(command, measured.time)
             response, swinging = force_response(time, reached, start, to, size)
@@ -134,7 +135,7 @@ def step_section(recording: AnalysedRecording) -> Section | None:
             settled += ", without a lasting rise in its last stretch without a gap" * math.isnan(response.settling)
             came = f"a step from {shown(step.before, unit)}{settled}"
             sentences.append(f"{name}: {'commanded from the beginning' if math.isnan(step.before) else came}.")
-            if step.swings.verdict in (Verdict.DIVERGED, Verdict.LIMIT_CYCLE):
+            if step.swings.verdict in UNSTABLE:
                 doubts.append(f"{name}: the {quantity} {fate_words(step.swings)}.")
             findings += [
                 Finding(f"{name}: {quantity} in the steady state", unit, response.final, step.commanded),

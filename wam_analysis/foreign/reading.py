@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -233,7 +234,8 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
 def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
     """The paths of trajectories, each until the next one begins.
 
-    They are straight between the points, or cubic where these have velocities, as ros2_control interpolates them.
+    They are straight between the points, cubic where these have velocities, and of the fifth degree where they have
+    accelerations, too, as ros2_control interpolates them.
     """
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
@@ -245,7 +247,7 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
             continue
         # JSON leaves out what is empty or 0
         knots = [begin + (_whole(getattr(point, "time_from_start", None)) or 0) for point in points]
-        fields = [[getattr(one, own, ()) for one in points] for own in OF_POINT.values()]
+        fields = [[getattr(one, own, ()) for one in points] for own in (*OF_POINT.values(), "accelerations")]
         if np.any(np.diff(knots) < 0) or any(len({*map(len, field)}) > 1 for field in fields):
             wrong += 1
             continue
@@ -260,28 +262,33 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
             held = {names: [value[:1] for value in values]}
             continue
         at = at[at < end]
-        position, velocity, effort = values
-        each = ((position, velocity), (velocity, None), (effort, None))
-        taken = [_spline(at, np.array(knots), value, rate) for value, rate in each]
+        position, velocity, effort, acceleration = values
+        each = ((position, velocity, acceleration), (velocity, acceleration), (effort,), (acceleration,))
+        taken = [_spline(at, np.array(knots), *one) for one in each]
         held = {names: [value[-1:] for value in taken]}
-        groups.append((np.arange(len(at)) + sum(map(len, times)), (at, frame, names, taken)))
+        groups.append((np.arange(len(at)) + sum(map(len, times)), (at, frame, names, taken[:3])))
         times.append(at)
     found = joint_columns(np.concatenate(times), groups)
     return found._replace(irregular={**found.irregular, UNORDERED: wrong}) if wrong else found
 
 
-def _spline(at: Times, knots: Times, value: Numbers, rate: Numbers | None) -> Numbers:
-    """Values (k, n) of knots at some instants (m,), ns: cubic with their rates (k, n), 1/s, or straight, (m, n)."""
+def _spline(at: Times, knots: Times, value: Numbers, *rates: Numbers) -> Numbers:
+    """Values (k, n) of knots at some instants (m,), ns, (m, n): straight, or with the rates (k, n), 1/s, and theirs."""
     row = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, max(len(knots) - 2, 0))
     after = np.minimum(row + 1, len(knots) - 1)
     wait = (knots[after] - knots[row])[:, np.newaxis]
     part = np.clip((at - knots[row])[:, np.newaxis] / np.maximum(wait, 1), 0.0, 1.0)
-    rise = value[after] - value[row]
-    if rate is None or rate.shape != value.shape:
-        return np.asarray(value[row] + part * rise, np.float64)
-    first, last = (wait / BILLION * rate[rows] - rise for rows in (row, after))  # off the straight line
-    bend = part * (1.0 - part) * ((1.0 - part) * first - part * last)
-    return np.asarray(value[row] + part * rise + bend, np.float64)
+    rise, edge = value[after] - value[row], part * (1.0 - part)
+    path = value[row] + part * rise
+    there = takewhile(lambda rate: rate.shape == value.shape, rates)
+    known = [[wait / BILLION * rate[rows] for rows in (row, after)] for rate in there]
+    if known:
+        first, last = (one - rise for one in known[0])  # off the straight line
+        path = path + edge * ((1.0 - part) * first - part * last)
+    if len(known) > 1:
+        begin, end = (0.5 * wait / BILLION * one for one in known[1])
+        path = path + edge**2 * ((1.0 - part) * (begin + 2.0 * first + last) + part * (end - first - 2.0 * last))
+    return np.asarray(path, np.float64)
 
 
 def _whole(stamp: Any) -> int | None:

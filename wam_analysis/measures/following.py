@@ -18,7 +18,8 @@ class Following(NamedTuple):
     Attributes
     ----------
     rms, largest : error, in the unit of the signal.
-    gain, delay, offset : the signal is `gain` times the command of `delay` s before, and a constant.
+    gain, delay : what moves of the signal is `gain` times that of the command of `delay` s before.
+    offset : mean of the signal less that of this command.
     play : by which the command moves after it turned until the signal does, 0 where that does not show.
     unexplained : rms of what these leave, over that of the motion.
     """
@@ -87,14 +88,16 @@ def _played(path: Numbers, play: float) -> Numbers:
 
 
 def _searched(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> _Fit:
-    """The fit with the delay that leaves least; of a command that repeats it is the shortest of those."""
+    """The fit with the delay that leaves less than those about it; where a command repeats, the shortest such."""
     span = CYCLE.longest_delay * np.linspace(-1.0, 1.0, CYCLE.delays)
     fits = [_fit(time, value, stamps, sent, delay) for delay in span.tolist()]
     right = [one for one in fits if one.gain > 0.0] or fits
     if SHAFT.much_better * min(right).rest > min(fits).rest:
         right = fits  # its sign is the other one
-    alike = [one for one in right if SHAFT.better * one.rest <= min(right).rest]
-    best = min(alike, key=lambda one: abs(one.delay))
+    most = min(right).rest / SHAFT.better
+    about = zip(right, right[1:], right[2:], strict=False)
+    least = [here for before, here, after in about if here.rest <= most and here <= min(before, after)]
+    best = min(least, key=lambda one: abs(one.delay), default=min(right))
     for finer in (0.5 * CYCLE.delays, (0.5 * CYCLE.delays) ** 2):
         near = best.delay + span / finer
         best = min(_fit(time, value, stamps, sent, delay) for delay in near.tolist())
@@ -107,6 +110,5 @@ def _fit(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers, delay: f
     middle, level = float(np.mean(path)), float(np.mean(value))
     power = float((path - middle) @ (path - middle))
     gain = float((path - middle) @ value) / power if power else 0.0
-    offset = level - gain * middle
-    rest = value - gain * path - offset
-    return _Fit(math.sqrt(float(rest @ rest) / len(rest)), delay, gain, offset)
+    rest = value - level - gain * (path - middle)
+    return _Fit(math.sqrt(float(rest @ rest) / len(rest)), delay, gain, level - middle)
