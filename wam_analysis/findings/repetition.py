@@ -70,7 +70,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 ]
     which = "that was not commanded" if recording.commands else "in this recording"
     sentences = [f"{', '.join(names)}: {ORIGINS[origin]}." for origin, names in alike.items() if names]
-    stated = sentences or [f"Nothing {which} repeats five times."]
+    stated = sentences or [f"Nothing {which} was found to repeat five times without a gap."]
     shows = [
         f"{max(those)[1]}{f', and {len(those) - 1} more at this frequency' * (len(those) > 1)}."
         for those in cycling.values()

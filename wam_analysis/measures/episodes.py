@@ -22,10 +22,11 @@ class Episode(NamedTuple):
 def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     """Limit cycles in windows of the whole, of half, of a quarter ... of a signal, in the order of time.
 
+    The whole is without rests at both ends.
     Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
     window or beyond it, and is evaluated between these ends.  A motion that decays between them is none, one that grows
     is one.  There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow
-    motion: one that ends within a period is part of its shape.
+    motion: one that ends within a period, or has half of its period, is part of its shape.
 
     Parameters
     ----------
@@ -33,6 +34,10 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     value : (n,), without NaN.
     least : peak to peak of the smallest cycle that is reported, above the noise.
     """
+    from_start, to_end = (np.flatnonzero(np.abs(value - value[end]) > least) for end in (0, -1))
+    if len(from_start) and len(to_end) and from_start[0] < to_end[-1]:
+        moving = slice(max(from_start[0] - 1, 0), to_end[-1] + 2)
+        time, value = time[moving], value[moving]
     n = length = len(value)
     longest = np.full(n, n)  # window that is looked at
     found: list[Episode] = []
@@ -55,7 +60,8 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
                 inner = slice(first, last)  # with its ends within the recording
             both = (_cycle(time[inner], signal[inner], least, cycle.period) for signal in (value, flat))
             better = max(filter(None, both), key=lambda one: one.confidence, default=None)
-            is_shape = CYCLE.slowest_cycles * (last - first) < np.max(longest[first:last] % n)  # of a slower one
+            slower = np.max(longest[first:last] % n) / CYCLE.slowest_cycles  # lag of one that is there, or 0
+            is_shape = last - first < slower or abs(2.0 * lag - slower) < CYCLE.same_period * slower
             goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
             changing = None if better or is_shape else _changing(time[inner], flat[inner], cycle.period)
             if is_shape or goes_on or changing:
@@ -94,11 +100,8 @@ def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan
     if not np.ptp(value) > least:
         return None
     cycle = limit_cycle(time, value, period)
-    return (
-        cycle
-        if cycle.confidence >= CYCLE.sure and cycle.cycles >= CYCLE.episode_cycles and cycle.peak_to_peak > least
-        else None
-    )
+    is_enough = (1.0 + CYCLE.same_period) * cycle.cycles >= CYCLE.episode_cycles
+    return cycle if cycle.confidence >= CYCLE.sure and is_enough and cycle.peak_to_peak > least else None
 
 
 def _width(time: Numbers, period: float) -> int:
@@ -133,8 +136,9 @@ def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: Ma
     """
     width = _width(time, period)
     turns = flat * np.exp(-2j * np.pi * (time - time[0]) / period)
-    held = np.convolve(np.ones(len(flat)), np.ones(width), "same")  # fewer at both ends
-    amplitude = np.abs(np.convolve(turns, np.ones(width), "same")) / held
+    total, row = np.concatenate([[0.0], np.cumsum(turns)]), np.arange(len(flat))
+    low, high = np.maximum(row - width // 2, 0), np.minimum(row + width // 2, len(flat))  # narrower at both ends
+    amplitude = np.abs(total[high] - total[low]) / (high - low)
     inside = amplitude[rows][width // 2 : -(width // 2)]
     size = float(np.sum(inside**3) / np.sum(inside**2))  # quiet parts do not count
     parts = runs((amplitude >= 0.5 * size) & free)

@@ -184,7 +184,8 @@ def _robust(columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half:
     def fit() -> tuple[list[int], Numbers, Numbers]:
         """Columns that the kept samples distinguish, their factors in terms of `scale`, what is left of all samples."""
         used = _distinct(scaled[keep], width)
-        solution = np.asarray(np.linalg.lstsq(scaled[keep][:, used], wanted[keep], rcond=None)[0], np.float64)
+        a = scaled[keep][:, used]
+        solution = np.asarray(np.linalg.lstsq(a.T @ a, a.T @ wanted[keep], rcond=None)[0], np.float64)
         return used, solution, wanted - scaled[:, used] @ solution
 
     for _ in range(4):

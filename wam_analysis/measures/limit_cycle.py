@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.measures.runs import after_gaps, noise
-from wam_analysis.thresholds import CYCLE
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.arrays import Numbers
 
 
@@ -70,6 +70,10 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     flat = flat - centre * np.linalg.lstsq(drift, flat, rcond=None)[0][0]
     phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
     folded = _fold(flat, phase, phases)
+    if math.isnan(period) and n >= 2 * CYCLE.cycles * lag:
+        double = _fold(flat, 0.5 * np.arange(n) / lag % 1.0, phases)
+        if 1.0 - double.explained < SHAFT.much_better * (1.0 - folded.explained):  # every other cycle is alike
+            return limit_cycle(time, value, 2.0 * lag * seconds)
     half = n // 2
     first, second = (_fold(flat[rows], phase[rows], phases).size for rows in (slice(half), slice(half, n)))
     growth = second / first if first > 0.0 else math.inf
@@ -131,7 +135,8 @@ def _refined(flat: Numbers, lag: float) -> float:
     """The lag by the drift of the phase of its first harmonic: an error of it blurs the mean of many cycles."""
     width = max(2 * round(lag), 2)
     turns = flat * np.exp(-2j * np.pi * np.arange(len(flat)) / lag)
-    phase = np.unwrap(np.angle(np.convolve(turns, np.ones(width) / width, "valid")))
+    total = np.concatenate([[0.0], np.cumsum(turns)])
+    phase = np.unwrap(np.angle(total[width:] - total[:-width]))
     if len(phase) < width:
         return lag
     slope = float(np.polynomial.polynomial.polyfit(np.arange(len(phase)), phase, 1)[1])
