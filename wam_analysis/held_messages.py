@@ -49,10 +49,11 @@ def held_rows(stamps: Times, base: Times, held: int = STREAM.held) -> tuple[Inde
 
 def value_changes(values: Numbers, least: float = HOLD.equal_force) -> Mask:
     """(n - 1,), whether each command but the first, (n, k), differs from that since the last change: also in a ramp."""
-    found, since = np.zeros(max(len(values) - 1, 0), np.bool_), values[:1]
+    found, rows = np.zeros(max(len(values) - 1, 0), np.bool_), values.tolist()
+    since = rows[0] if rows else []
     for row in np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1)).tolist():
-        if np.any(np.abs(values[row + 1] - since) > least):
-            found[row], since = True, values[row + 1]
+        if any(abs(now - before) > least for now, before in zip(rows[row + 1], since, strict=True)):
+            found[row], since = True, rows[row + 1]
     return found
 
 

@@ -431,7 +431,7 @@ def test_the_command_writes_text_json_and_page(
     assert "What happened" in out
     assert max(map(len, out.splitlines())) <= 100
     assert "reading" in err
-    (tmp_path / "t.csv").write_text("t,q1\n0.0,1.0\n")
+    (tmp_path / "t.csv").write_text("u,q1\n0.0,1.0\n")
     for name, said, *more in (
         ("nothing", "does not exist"), ("no.csv", "No such file"), ("t.csv", "has no column 'time'"),
         ("t.csv", "'x' is no unit of position; give", "--unit", "position=x"),

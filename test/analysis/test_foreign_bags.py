@@ -559,19 +559,13 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
             found((small, topic_map([topic], [], [], [], ["stamp=us"])))
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (([], [], [], ["speed=v"], []), "--map is 'speed=v'"),
-        (
-            ([], [], [], [], ["effort=lbf"]),
-            "'lbf' is no unit of effort; give --unit effort= and a factor or one of N, mN",
-        ),
-        (([], [], [], [], ["name=s"]), "--unit is 'name=s'"),
-        (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; give"),
-        (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    (([], [], [], ["speed=v"], []), "--map is 'speed=v'"),
+    (([], [], [], [], ["effort=lbf"]), "'lbf' is no unit of effort; give --unit effort= and a factor or one of N, mN"),
+    (([], [], [], [], ["name=s"]), "--unit is 'name=s'"),
+    (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; give"),
+    (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),
+])  # fmt: skip
 def test_an_option_that_says_nothing_is_refused(options: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         topic_map(*options)
@@ -698,15 +692,6 @@ def test_corners_of_a_cycle_are_not_cut_off(shape: str, jitter: float, tmp_path:
     wave = 2.0 / np.pi * np.arcsin(np.sin(phase)) if shape == "triangle" else np.sign(np.sin(phase))
     found = cycle_of(of_positions(tmp_path / "bag", time, 0.005 * wave + at_rest(time, ["j"], 92)[:, 0]), 7.87)
     assert found.measured == pytest.approx(0.01, rel=CLOSE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("tau", [3.0, 6.0, 10.0])
-def test_a_slow_ring_down_is_no_limit_cycle_in_any_of_its_parts(tau: float, tmp_path: Path) -> None:
-    time = times(20.0)
-    ring = np.where(time > 1.5, np.exp(-(time - 1.5) / tau) * np.sin(2.0 * np.pi * 5.3 * (time - 1.5)), 0.0)
-    sentences = section(of_positions(tmp_path / "bag", time, 0.02 * ring + at_rest(time, ["j"], 94)[:, 0]), "stability")
-    assert sentences == ("Nothing in this recording repeats five times.",)
 
 
 @pytest.mark.slow

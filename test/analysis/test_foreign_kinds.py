@@ -159,6 +159,14 @@ def twice() -> list[Case]:
         Case("faster", ros1, stamped(one("/js", 50.0, 0.7, 0.5, None, 10.0), lambda t: 1.08 * t), {}, "runs at 108 %"),
         Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
         Case("less of a part", sqlite, sent + without(again[:1000], bool, "effort"), expected, "the first message of"),
+        Case(
+            "others",
+            by_rosbags,
+            [s._replace(stamp=sent[i - (i % 50 == 7)].stamp) for i, s in enumerate(sent)],
+            expected,
+            "60 of 3000 stamps repeat the one before",
+        ),
+        Case("in bursts", by_rosbags, [s._replace(received=s.received - s.stamp % -0.07) for s in sent], expected),
     ]
 
 
@@ -203,6 +211,8 @@ def names() -> list[Case]:
     given = topic_map([], ["p", "q"], [], [], [])
     return [
         Case("none", by_mcap_ros2, called(), numbers("joint1", "joint2"), "without a name"),
+        Case("none of a command", sqlite, called("x", "y") + [s._replace(topic="/cmd") for s in called()], {},
+             "without a name", topic_map([], [], ["/cmd"], [], []), ("Nothing measured is named joint1, joint2;",)),
         Case("none, ROS 1, given", ros1, called(), numbers("p", "q"), "", given),
         Case("empty", by_rosbags, called("", ""), numbers("joint1", "joint2"), "without a name"),
         Case("one of two", sqlite, called("x"), numbers("x", "joint2"), "without a name"),
@@ -277,21 +287,32 @@ def follows() -> list[Case]:
         played.append(min(max(played[-1], at - 0.01), at + 0.01))
     steps = np.repeat([0.1, 0.5, -0.3], len(time) // 3)
     risen = steps + np.repeat([0.0, -0.4, 0.8], len(time) // 3) * np.exp(-np.maximum(time % 7.0 - 0.06, 0.0) / 0.2)
-    points = [{"positions": [q], "velocities": [0.0], "time_from_start": {"sec": s}} for s, q in ((2, 1.0), (9, -0.5))]
-    trajectory = Sent("/t", TRAJECTORY, 2.0, 2.0, "", {"joint_names": ["a"], "points": points})
-    late = 0.22 + 0.75 * np.polynomial.Polynomial([0.0, 1.5, 0.0, -0.5])(np.clip(1.0 - (time - 4.1) / 3.5, -1.0, 1.0))
+    grows = steps + 0.005 * np.exp(time % 7.0 / 2.0) * np.sin(25.0 * (time % 7.0))
     force = np.outer(path(time), (0.0, 0.0, 3.0)) + 5.0
-    noise = 0.01 * np.random.default_rng(4).normal(size=force.shape)
+    noise, ramp = 0.01 * np.random.default_rng(4).normal(size=force.shape), np.clip(time / 10.0 - 0.2, 0.0, 1.0)
+
+    def trajectory(shape: list[float], **more: Any) -> Case:
+        points = [{"positions": [q], "velocities": [0.0], "time_from_start": {"sec": s}, **more}
+                  for s, q in ((2, 1.0), (9, -0.5))]  # fmt: skip
+        goal = Sent("/t", TRAJECTORY, 2.0, 2.0, "", {"joint_names": ["a"], "points": points})
+        late = 0.22 + 0.75 * np.polynomial.Polynomial(shape)(np.clip(1.0 - (time - 4.1) / 3.5, -1.0, 1.0))
+        expected = {"a position: delay": 0.1, "a position: gain": 1.0, "a position: largest steady error": 0.03}
+        sent = [*joint(late, late)[: len(late)], goal]
+        return Case(f"a trajectory {more}", by_rosbags, sent, expected, "", NOTHING, ("/t: 1 message;",))
+
     return [
         Case("late", by_rosbags, joint(path(time), 0.9 * path(time - 0.03)), {"a position: gain": 0.9,
              "a position: delay": 0.03}, "", to, ("Shows: a position: follows ",)),
         Case("play", ros1, joint(path(time), played, 2), {"a position: play": 0.02, "a position: delay": 0.02}, "", to),
         Case("steps", sqlite, joint(steps, risen - 0.02), {"a position: largest steady error": 0.02,
              "a position: median rise time 10-90 %": 0.2 * math.log(9.0)}, "", to),
-        Case("a trajectory", by_rosbags, [*joint(late, late)[: len(late)], trajectory],
-             {"a position: delay": 0.1, "a position: largest steady error": 0.03}, "", NOTHING, ("/t: 1 message;",)),
+        Case("grows", by_rosbags, joint(steps, grows), {}, "position, 0.5 rad at 7.0 s: it DIVERGES", to),
+        Case("a ramp", ros1, joint(ramp, np.interp(time - 0.1, time, ramp) + 0.5 * noise[:, 0]),
+             {"a position: delay": 0.1}, "", to),
+        trajectory([0.0, 1.5, 0.0, -0.5]), trajectory([0.0, 1.875, 0.0, -1.25, 0.0, 0.375], accelerations=[0.0]),
         Case("a force", by_mcap_ros2, wrenches("/f", time + 0.05, 0.8 * force + noise) + wrenches("/cmd", time, force),
-             {"/f force.z: gain": 0.8, "/f force.z: delay": 0.05}, "", to),
+             {"/f force.z: gain": 0.8, "/f force.z: delay": 0.05, "/f force.z: offset": -0.2 * force[:, 2].mean()},
+             "", to),
     ]  # fmt: skip
 
 
@@ -299,10 +320,14 @@ def few_cycles() -> list[Case]:
     fast = one("/js", 250.0, 0.15, 0.5, lambda q: q + 0.001 * np.sin(0.088 * math.pi * np.arange(len(q))), 20.0)
     part = one("/js", 200.0, 0.15, 0.6, lambda q: q + 0.002 * np.sin(0.11 * math.pi * np.arange(len(q))) *
                (np.arange(len(q)) // 3000 == 1), 60.0)  # fmt: skip
+    seven = one("/js", 100.0, 0.25, 0.3, lambda q: np.pad(q[:2800], (500, 700)), 40.0)
+    other = one("/js", 100.0, 0.25, 0.3, lambda q: np.where(np.arange(len(q)) // 400 % 2, 0.8, 1.0) * q, 48.0)
     lost = [s for s, kept in zip(fast, np.random.default_rng(3).random(len(fast)) > 0.15, strict=True) if kept]
     return [
         Case("beside a fast one", sqlite, without(fast, lambda _: True, "velocity", "effort"),
              {"a: frequency": 11.0, "a: cycle, peak to peak": 0.002}),
+        *(Case("rests and halves", by_rosbags, without(sent, lambda _: True, "velocity", "effort"),
+               {"a: frequency": f, "a: cycle, peak to peak": 0.6}) for sent, f in ((seven, 0.25), (other, 0.125))),
         Case("in a part", sqlite, part, {"a from 15.0 s: frequency": 11.0, "a from 15.0 s: end": 30.0}),
         Case("in each half", by_rosbags, without(one("/js", 100.0, 0.3, 0.5, lambda q: np.interp(
             np.arange(3000) * 9 // 10 / 0.9, np.arange(3000), q)), lambda _: True, "velocity", "effort"), {}, "",
@@ -471,6 +496,8 @@ def formats() -> list[Case]:
              {"7: frequency": 0.7}, "", MAPPED),
         Case("JSON of ROS", lambda path, sent: by_json(path, sent, "sensor_msgs/JointState"),
              without(one("/joint_states", 100.0, 0.7, 0.5), lambda _: True, "velocity"), sine(0.7, 0.5) | FRICTION),
+        Case("taps", ros1, wrenches("/f", time, np.outer(
+            np.exp(-(time % 6.0 - 1.0) ** 2 / 1.5e-4), (0.0, 0.0, 9.0)).round(2)), {}),
         *(Case(f"slash, {n}", way, frames, step, "", commanded) for n, way in enumerate((by_rosbags, sqlite))),
     ]  # fmt: skip
 
@@ -602,7 +629,7 @@ OTHER_UNITS = (1e-3, math.pi / 180.0, math.pi / 180.0, 1e-3)
 TABLES = {
     "plain": Written(),
     "no velocity": Written(("time", "position.a", "speed", "effort.a")),
-    "renamed": Written(("t", "q.a", "velocity.a", "effort.a"), fields=("stamp=t", "position=q")),
+    "renamed": Written(("t", "q.a", "velocity.a", "effort.a"), fields=("position=q",)),
     "units in the titles": Written(WITH_UNITS, OTHER_UNITS),
     "units, renamed": Written(("t [ms]", *WITH_UNITS[1:]), OTHER_UNITS, fields=("stamp=t [ms]",)),
     "decimal commas": Written(delimiter=";", decimal=","),
@@ -692,6 +719,7 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
     ("time,q\n0,1\n", topic_map([], [], [], ["effort=q", "position=p"], []), "no column 'p'; .* position=.*: time"),
     ("time,f\n0,1\n", topic_map([], [], [], ["force=f"], []), "no column 'f.x'; name that of force .*: time, f"),
+    ("0,1\n1,1\n", NOTHING, "numbers in its first row"),
 ])  # fmt: skip
 def test_a_table_that_cannot_be_read_as_it_is_meant_is_refused(
     text: str, given: Any, message: str, tmp_path: Path

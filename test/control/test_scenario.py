@@ -228,48 +228,45 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in body.items() if name != key}
 
 
-@pytest.mark.parametrize(
-    ("step", "text"),
-    [
-        ("go", "is 'go'; it must be a mapping with name and seconds"),
-        ({**WHOLE, "secnods": 1.0}, "unknown key 'secnods'; allowed: name, seconds, posture"),
-        (without(WHOLE, "name"), "'name' is missing"),
-        (without(WHOLE, "seconds"), "'seconds' is missing"),
-        ({**WHOLE, "name": None}, "name is None; it must be a text"),
-        ({**WHOLE, "seconds": 0}, "seconds is 0; it must be above 0"),
-        ({**WHOLE, "seconds": "1 s"}, "seconds is '1 s'; it must be a finite number"),
-        ({**WHOLE, "seconds": math.nan}, "seconds is nan; it must be a finite number"),
-        ({**WHOLE, "posture": [0.0] * 3}, r"posture is \[0.0, 0.0, 0.0\]; it must be a list of 4 numbers"),
-        ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
-        ({**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]}, "posture: joint2 is commanded to -9 rad; allowed: -2.356 to"),
-        ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
-        ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable, tare"),
-        ({**WHOLE, "force": 5.0}, "force is 5.0; it must be a mapping with frame, newtons"),
-        ({**WHOLE, "force": {"frame": "base"}}, "force: 'newtons' is missing"),
-        ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
-        ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
-        (placed(0.28, "base"), "contact_position is in m along a cover: command a force across it, in its frame"),
-        (
-            placed(0.28, newtons=[1, 0, 0]),
-            "contact_position is in m along a cover: command a force across it, in its frame",
-        ),
-        (placed(0.0), "contact_position is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
-        ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, contact_position"),
-        ({**WHOLE, "push": without(WHOLE["push"], "newtons")}, "push: 'newtons' is missing"),
-        ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
-        (
-            {**WHOLE, "push": {**WHOLE["push"], "contact_position": 0.6}},
-            "contact_position is 0.6 m; inner_link reaches from 0 to 0.5588 m",
-        ),
-        (
-            {**WHOLE, "push": {**WHOLE["push"], "newtons": [0, 0, 600]}},
-            "push: the force is 600 N; allowed: up to disturbance_force_limit, 500 N",
-        ),
-        ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "push has begin 0.1 s and end 0.1 s; allowed: begin from 0"),
-        ({**WHOLE, "push": {**WHOLE["push"], "end": 5.0}}, "begin 0.1 s and end 5 s; allowed: .* up to the 2.5 s of "),
-        ({**WHOLE, "push": {**without(WHOLE["push"], "end"), "begin": 2.5}}, "begin 2.5 s and end 2.5 s; allowed"),
-    ],
-)
+@pytest.mark.parametrize(("step", "text"), [
+    ("go", "is 'go'; it must be a mapping with name and seconds"),
+    ({**WHOLE, "secnods": 1.0}, "unknown key 'secnods'; allowed: name, seconds, posture"),
+    (without(WHOLE, "name"), "'name' is missing"),
+    (without(WHOLE, "seconds"), "'seconds' is missing"),
+    ({**WHOLE, "name": None}, "name is None; it must be a text"),
+    ({**WHOLE, "seconds": 0}, "seconds is 0; it must be above 0"),
+    ({**WHOLE, "seconds": "1 s"}, "seconds is '1 s'; it must be a finite number"),
+    ({**WHOLE, "seconds": math.nan}, "seconds is nan; it must be a finite number"),
+    ({**WHOLE, "posture": [0.0] * 3}, r"posture is \[0.0, 0.0, 0.0\]; it must be a list of 4 numbers"),
+    ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
+    ({**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]}, "posture: joint2 is commanded to -9 rad; allowed: -2.356 to"),
+    ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
+    ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable, tare"),
+    ({**WHOLE, "force": 5.0}, "force is 5.0; it must be a mapping with frame, newtons"),
+    ({**WHOLE, "force": {"frame": "base"}}, "force: 'newtons' is missing"),
+    ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
+    ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
+    (placed(0.28, "base"), "contact_position is in m along a cover: command a force across it, in its frame"),
+    (
+        placed(0.28, newtons=[1, 0, 0]),
+        "contact_position is in m along a cover: command a force across it, in its frame",
+    ),
+    (placed(0.0), "contact_position is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
+    ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, contact_position"),
+    ({**WHOLE, "push": without(WHOLE["push"], "newtons")}, "push: 'newtons' is missing"),
+    ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
+    (
+        {**WHOLE, "push": {**WHOLE["push"], "contact_position": 0.6}},
+        "contact_position is 0.6 m; inner_link reaches from 0 to 0.5588 m",
+    ),
+    (
+        {**WHOLE, "push": {**WHOLE["push"], "newtons": [0, 0, 600]}},
+        "push: the force is 600 N; allowed: up to disturbance_force_limit, 500 N",
+    ),
+    ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "push has begin 0.1 s and end 0.1 s; allowed: begin from 0"),
+    ({**WHOLE, "push": {**WHOLE["push"], "end": 5.0}}, "begin 0.1 s and end 5 s; allowed: .* up to the 2.5 s of "),
+    ({**WHOLE, "push": {**without(WHOLE["push"], "end"), "begin": 2.5}}, "begin 2.5 s and end 2.5 s; allowed"),
+])  # fmt: skip
 def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, text: str, tmp_path: Path) -> None:
     path = write(tmp_path, {"steps": [{"name": "fine", "seconds": 1.0}, step]})
     with pytest.raises(ParameterError, match=text) as refusal:
@@ -277,24 +274,21 @@ def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, tex
     assert str(refusal.value).startswith(f"{path}, step 2")
 
 
-@pytest.mark.parametrize(
-    ("tree", "text"),
-    [
-        ("steps: [", "is not YAML"),
-        ("steps: []\nsteps: []", "'steps' is given twice"),
-        ("steps: &a [{name: x, seconds: 1.0, set: *a}]", r"is not YAML: \*a is inside of what it refers to"),
-        (
-            {"steps": [{"name": "a", "seconds": 1, "set": {"force_loop": {1: 2}}}]},
-            "is not YAML: the key 1 is no text; write it in quotes",
-        ),
-        ("- 1", "has no list 'steps'"),
-        ("", "has no list 'steps'"),
-        ({"step": [{"name": "a", "seconds": 1}]}, "unknown key 'step'; allowed: steps"),
-        ({"steps": {"name": "a"}}, "has no list 'steps'"),
-        ({"steps": []}, "has no steps; give at least one"),
-        ({"steps": [{"name": "a", "seconds": 1}], "loops": 3}, "unknown key 'loops'; allowed: steps"),
-    ],
-)
+@pytest.mark.parametrize(("tree", "text"), [
+    ("steps: [", "is not YAML"),
+    ("steps: []\nsteps: []", "'steps' is given twice"),
+    ("steps: &a [{name: x, seconds: 1.0, set: *a}]", r"is not YAML: \*a is inside of what it refers to"),
+    (
+        {"steps": [{"name": "a", "seconds": 1, "set": {"force_loop": {1: 2}}}]},
+        "is not YAML: the key 1 is no text; write it in quotes",
+    ),
+    ("- 1", "has no list 'steps'"),
+    ("", "has no list 'steps'"),
+    ({"step": [{"name": "a", "seconds": 1}]}, "unknown key 'step'; allowed: steps"),
+    ({"steps": {"name": "a"}}, "has no list 'steps'"),
+    ({"steps": []}, "has no steps; give at least one"),
+    ({"steps": [{"name": "a", "seconds": 1}], "loops": 3}, "unknown key 'loops'; allowed: steps"),
+])  # fmt: skip
 def test_a_file_that_is_no_scenario_is_refused_by_name(tree: Any, text: str, tmp_path: Path) -> None:
     path = write(tmp_path, tree)
     with pytest.raises(ParameterError, match=text) as refusal:
@@ -491,17 +485,14 @@ TURNED = [1.0, -0.6, 0.0, 0.5]
 SLOWLY = {"force_loop:joint_speed_limit": 0.3}
 
 
-@pytest.mark.parametrize(
-    ("motion", "advice"),
-    [
-        ({"trajectory": {"postures": [TURNED]}}, "lower motion.joint_speed to 0.3 rad/s"),
-        (
-            {"trajectory": {"postures": [TURNED], "times": [4.0]}},
-            "give it 1.56 times the time, or no times and lower motion.joint_speed to 0.3 rad/s",
-        ),
-        ({"tip": [0.7, 0.5, 0.1]}, "lower motion.joint_speed to 0.3 rad/s"),
-    ],
-)
+@pytest.mark.parametrize(("motion", "advice"), [
+    ({"trajectory": {"postures": [TURNED]}}, "lower motion.joint_speed to 0.3 rad/s"),
+    (
+        {"trajectory": {"postures": [TURNED], "times": [4.0]}},
+        "give it 1.56 times the time, or no times and lower motion.joint_speed to 0.3 rad/s",
+    ),
+    ({"tip": [0.7, 0.5, 0.1]}, "lower motion.joint_speed to 0.3 rad/s"),
+])  # fmt: skip
 def test_a_motion_that_the_force_loop_cannot_follow_is_refused(motion: Any, advice: str, tmp_path: Path) -> None:
     begin = {"name": "begin", "seconds": 6.0, "posture": START}
     path = str(write(tmp_path, {"steps": [begin, {"name": "go", "seconds": 9.0, **motion}]}))
@@ -576,21 +567,18 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("step", "text"),
-    [
-        (ScenarioStep("go", 1.0, cast(Any, np.array(GOAL))), "posture is array.*; it must be a list .*; give its tol"),
-        (ScenarioStep("go", 1.0, force=cast(Any, [1.0, 2.0])), r"force is .*; give a ForceCommand\("),
-        (ScenarioStep("go", 1.0, push=Push("outer_link", 2.0, ZERO, 0.0, 1.0)), "contact_position is 2 m; outer_link"),
-        (task(PRESSING._replace(position=2.0)), "axis 1: contact_position is 2.0 m; allowed: 0 to"),
-        (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is commanded to 9.0 rad; allowed"),
-        (task(), "the task has no axes; give at least one, or no task"),
-        (setting("force_loop", "posture_gain", -1.0), "set, force_loop: parameter 'posture_gain' is -1.0 1/s; allowed"),
-        (ScenarioStep("go", 1.0, settings=cast(Any, None)), r"settings is None; it must be a list of Setting\("),
-        (path(PosturePath(())), "the trajectory has no points; give at least one"),
-        (path(PosturePath((PathPoint(tuple(GOAL), (0.1,)),))), r"velocity is \(0.1,\); it must be a list of 4 numbers"),
-    ],
-)
+@pytest.mark.parametrize(("step", "text"), [
+    (ScenarioStep("go", 1.0, cast(Any, np.array(GOAL))), "posture is array.*; it must be a list .*; give its tol"),
+    (ScenarioStep("go", 1.0, force=cast(Any, [1.0, 2.0])), r"force is .*; give a ForceCommand\("),
+    (ScenarioStep("go", 1.0, push=Push("outer_link", 2.0, ZERO, 0.0, 1.0)), "contact_position is 2 m; outer_link"),
+    (task(PRESSING._replace(position=2.0)), "axis 1: contact_position is 2.0 m; allowed: 0 to"),
+    (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is commanded to 9.0 rad; allowed"),
+    (task(), "the task has no axes; give at least one, or no task"),
+    (setting("force_loop", "posture_gain", -1.0), "set, force_loop: parameter 'posture_gain' is -1.0 1/s; allowed"),
+    (ScenarioStep("go", 1.0, settings=cast(Any, None)), r"settings is None; it must be a list of Setting\("),
+    (path(PosturePath(())), "the trajectory has no points; give at least one"),
+    (path(PosturePath((PathPoint(tuple(GOAL), (0.1,)),))), r"velocity is \(0.1,\); it must be a list of 4 numbers"),
+])  # fmt: skip
 def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, text: str) -> None:
     with pytest.raises(ParameterError, match=f"^step 2[:,] .*{text}"):
         Scenario([ScenarioStep("fine", 1.0), step], SHARED)
@@ -598,16 +586,13 @@ def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, t
         Simulation(CONFIGURATION, [ScenarioStep("fine", 1.0), step])
 
 
-@pytest.mark.parametrize(
-    ("steps", "text"),
-    [
-        ([], "no steps"),
-        (None, "steps is None; it must be a list of ScenarioStep"),
-        ((one for one in [ScenarioStep("go", 1.0)]), "steps is <generator .*; it must be a list of ScenarioStep"),
-        ([ScenarioStep("go", 1.0), None], "step 2 is None; give a ScenarioStep"),
-        ([{"name": "go", "seconds": 1.0}], "step 1 is {'name': 'go', .*; give a ScenarioStep"),
-    ],
-)
+@pytest.mark.parametrize(("steps", "text"), [
+    ([], "no steps"),
+    (None, "steps is None; it must be a list of ScenarioStep"),
+    ((one for one in [ScenarioStep("go", 1.0)]), "steps is <generator .*; it must be a list of ScenarioStep"),
+    ([ScenarioStep("go", 1.0), None], "step 2 is None; give a ScenarioStep"),
+    ([{"name": "go", "seconds": 1.0}], "step 1 is {'name': 'go', .*; give a ScenarioStep"),
+])  # fmt: skip
 def test_steps_that_are_none_are_refused_by_number(steps: Any, text: str) -> None:
     with pytest.raises(ParameterError, match=text):
         Scenario(steps)
@@ -693,19 +678,12 @@ def test_a_step_made_in_python_sets_the_parameters_of_a_controller_that_takes_th
     assert run.nodes["force_loop"].own.stride == 2.0
 
 
-@pytest.mark.parametrize(
-    ("more", "chirp", "text"),
-    [
-        (
-            {},
-            0.0,
-            "step 'press': 70 N is commanded; allowed: up to force_limit, 60 N; command less, or raise force_loop:",
-        ),
-        ({}, 20.0, "90 N is commanded; allowed"),
-        ({"set": {"force_loop": {"force_limit": 69.0}}}, 0.0, "70 N is commanded; allowed: up to force_limit, 69 N"),
-        ({"set": {"force_loop": {"force_limit": 70.0}}}, 0.0, ""),
-    ],
-)
+@pytest.mark.parametrize(("more", "chirp", "text"), [
+    ({}, 0.0, "step 'press': 70 N is commanded; allowed: up to force_limit, 60 N; command less, or raise force_loop:"),
+    ({}, 20.0, "90 N is commanded; allowed"),
+    ({"set": {"force_loop": {"force_limit": 69.0}}}, 0.0, "70 N is commanded; allowed: up to force_limit, 69 N"),
+    ({"set": {"force_loop": {"force_limit": 70.0}}}, 0.0, ""),
+])  # fmt: skip
 def test_a_force_above_the_limit_is_refused_before_the_start(
     more: dict[str, Any], chirp: float, text: str, tmp_path: Path
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wam_analysis.contact_list import median
-from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.finding import Finding, Section, counted, shown
 from wam_analysis.foreign.sources import Source
 from wam_analysis.measures.runs import missed, usual_steps
 from wam_analysis.recording import RATE, STAMPED, AnalysedRecording
@@ -81,8 +81,10 @@ def timing_section(recording: AnalysedRecording) -> Section:
             late = float(np.median(received - stamp))
             if abs(late) < STREAM.reset:  # else they are of two clocks
                 findings.append(Finding(f"{name}: delay of the receptions", "ms", late / 1e6))
-            levels = np.linspace(0.05, 0.95, STREAM.parts)
-            at, passed = (np.quantile(each - each[0], levels) for each in (received, stamp))
+            at, passed = (
+                [np.mean(part) for part in np.array_split(np.sort(each - each[0]), STREAM.parts)]
+                for each in (received, stamp)
+            )
             (speed, _), ((variance, _), _) = np.polyfit(at, passed, 1, cov=True)  # delays that change are on no line
             if abs(speed - 1.0) > max(STREAM.drift, SHAFT.noisy * math.sqrt(variance)):
                 what = f"the clock of the stamps runs at {100.0 * speed:.4g} % of that of the receptions"
@@ -90,7 +92,9 @@ def timing_section(recording: AnalysedRecording) -> Section:
         if slowest > STREAM.changes * period:
             wrong.append(f"{name}: the period changes between {shown(period, 's')} and {shown(slowest, 's')}.")
         if lost:
-            what = f"{lost:.0f} messages missing" if lost > 0.0 else "irregular stamps, missing messages are not known"
+            what = "irregular stamps, missing messages are not known"
+            if lost > 0.0:
+                what = f"{counted(int(lost), 'message')} missing"
             wrong.append(f"{name}: {what}; longest gap: {shown(gap, 's')}.")
     silent = "No message is missing." if findings else "No stamped topic was recorded."
     sentences = wrong or [silent] * (recording.is_foreign or not findings)  # ours lists what is lost
@@ -114,7 +118,7 @@ def provenance(recording: AnalysedRecording) -> dict[str, str]:
     metadata, parameters = bag.metadata.get(RECORDING, {}), recording.run.parameters
     counts = {name: len(columns.log_time_ns) for name, columns in bag.topics.items()}
     whole = bag.counts or counts
-    read = [counts.get(name, 0) for name in whole]  # a message of a controller has its command, too
+    read = [min(counts.get(name, 0), number) for name, number in whole.items()]  # a trajectory has many rows
     try:
         here = version("wam_stack")
     except PackageNotFoundError:

@@ -38,6 +38,11 @@ def topics_section(recording: AnalysedRecording) -> Section:
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
+    measured = {one.name for one in found if not one.is_command}
+    if unknown := [one.label for one in found if one.is_command and one.name not in measured]:
+        sentences.append(
+            f"Nothing measured is named {', '.join(unknown)}; where a command has no names, give --joint for each."
+        )
     sentences += [f"{text}." for one in found if not (one.is_command or one.is_joint) and (text := frame_change(one))]
     if computed := [one.label for one in found if _lacks_velocity(one)]:
         sentences.append(f"The velocity is computed from the position: {', '.join(computed)}.")

@@ -29,6 +29,8 @@ class Treatment(StrEnum):
     ROUNDED = "the stamps are rounded to {size}; reception times are used"
     # the times of reception are coarse, too
     SPREAD = "the stamps are rounded to {size}; the messages are placed evenly between them"
+    REPEATED = "{number} of {of} stamps repeat the one before; reception times are used"
+    BETWEEN = "{number} of {of} stamps repeat the one before; the messages are placed evenly between them"
     TWICE = "{number} of {of} stamps came twice; the first message of each is used"
     RELAYED = "{number} of {of} messages repeat the one before at another interval, as by a relay; the others are used"
     WRAPPED = "the {quantity} jumps {times} by {size}; it is unwrapped"
@@ -237,13 +239,14 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
     again *= 2 * np.sum(changed) < np.sum(~same)  # they are no copies where nothing moves
     is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
-    quantum = _quantum(steps)
+    quantum, is_few = _quantum(steps), 0 < 2 * number < of
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
     fine = STREAM.irregular * period
     own = steps[~same] if is_seldom else steps
     if of > SHAFT.fewest_samples and quantum > fine and np.std(waits) < STREAM.paced * np.std(own):
-        return _received(rows, stamps, received, quantum)
+        treated = Treated(Treatment.REPEATED if is_few else Treatment.ROUNDED, "", number, of, quantum / 1e9)
+        return _received(rows, stamps, received, treated)
     placed = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])
     even = np.linspace(stamps[0], stamps[-1] + period, of, endpoint=False)
     if np.max(np.abs(even - placed)) <= quantum:
@@ -253,7 +256,8 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     if not is_rounded and (is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]):
         left_out = of - int(np.sum(kept))
         return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
-    return _Timed(rows, placed / 1e9, (Treated(Treatment.SPREAD, "", size=quantum / 1e9),))
+    what = Treatment.BETWEEN if is_few else Treatment.SPREAD
+    return _Timed(rows, placed / 1e9, (Treated(what, "", number, of, quantum / 1e9),))
 
 
 def _quantum(steps: Times) -> int:
@@ -338,13 +342,12 @@ def _parts(columns: JointColumns | WrenchColumns) -> dict[str, dict[str, Numbers
     }
 
 
-def _received(rows: Index, stamps: Times, received: Times, quantum: int) -> _Timed:
-    """Messages with stamps rounded to a quantum at their times of reception, less what these are later at least."""
+def _received(rows: Index, stamps: Times, received: Times, treated: Treated) -> _Timed:
+    """Messages at their times of reception, less what these are later than the stamps at least."""
     arrived = received[rows]
     order = np.argsort(arrived, kind="stable")
     times = arrived[order] - np.min(arrived - stamps)
     kept = np.concatenate([[True], np.diff(times) > 0])
-    treated = Treated(Treatment.ROUNDED, "", size=quantum / 1e9)
     return _Timed(rows[order][kept], times[kept] / 1e9, (treated,))
 
 
@@ -440,11 +443,16 @@ def _frozen(shown: Source, after: int) -> int:
 
 
 def _spikes(value: Numbers, least: float) -> Index:
-    """Rows of single samples away from both neighbours, by more than all others extend over, and a least way."""
+    """Rows of single samples away from both neighbours, by more than all others extend over, and a least way.
+
+    On both sides of the peak of a short pulse the signal moves, too.
+    """
     value = np.where(np.isfinite(value), value, math.nan)
     steps = np.diff(value)
     there, back = steps[:-1], -steps[1:]
     away = np.fmax(0.0, np.fmax(np.minimum(there, back), np.minimum(-there, -back)))
+    around = np.abs(np.pad(steps, 1))
+    away[np.minimum(around[:-3], around[3:]) >= away] = 0.0
     if len(away) < SHAFT.fewest_samples:
         return np.zeros(0, np.int64)
     ends = STREAM.repeated, 1.0 - STREAM.repeated

@@ -29,6 +29,7 @@ RENAMED = (
     f"position.JOINT, velocity.JOINT, effort.JOINT, force.x to torque.z, a command {COMMANDED}position.JOINT; for a "
     "single joint, give --map position=COLUMN instead"
 )
+TIMES = ("t", "timestamp")  # titles of a time that has no column 'time'
 WRENCH = ("force", "torque")  # quantities along x, y and z
 
 
@@ -58,6 +59,8 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
             f"{path} has a row of {len(wide)} cells below {len(head)} titles, its first line; remove the lines "
             "above the titles, or separate cells by ';' or tabs"
         )
+    if not math.isnan(_number(head[0])):
+        raise BagError(f"{path} has numbers in its first row; put the titles of the columns above them")
     if not any(map(str.isdecimal, "".join(rows[0]))):
         units, *rows = rows  # below the titles
         head = [
@@ -105,9 +108,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     if given.topics or given.commands or "name" in given.fields:
         raise ValueError(f"{path} is a table: leave out --topic, --command and --map name. {COMMANDS}")
     _require_once(path, [*map(str, series)])
-    if "stamp" not in given.fields and not _columns(series, "stamp", given):
-        timed = [name for name, unit in map(_split, map(str, series)) if UNITS.get(unit, ("", ""))[1] == "s"]
-        given = given._replace(fields={**given.fields, **{"stamp": name for name in timed if len(timed) == 1}})
+    given = _with_time(series, given)
     units = dict(given.units)
     found = {quantity: _columns(series, quantity, given) for quantity in QUANTITIES}
     found |= {quantity: [one for one in found[quantity] if one.name in tuple("xyz")] for quantity in WRENCH}
@@ -142,6 +143,15 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     types = {topic: COMMAND if topic.endswith("_command") else "table" for topic in topics}
     types |= {str(one): UNUSED for one in series if str(one) not in used and str(one).strip()}
     return checked(Bag(path, topics, types, {}, {}, dict.fromkeys(topics, len(times))), given), given
+
+
+def _with_time(series: Mapping[str, Any], given: TopicMap) -> TopicMap:
+    """The map with the title of the time: without a column 'time', of the only one with its title or unit."""
+    if "stamp" in given.fields or _columns(series, "stamp", given):
+        return given
+    titles = map(_split, map(str, series))
+    timed = [name for name, unit in titles if name.lower() in TIMES or UNITS.get(unit, ("", ""))[1] == "s"]
+    return given._replace(fields={**given.fields, "stamp": timed[0]}) if len(timed) == 1 else given
 
 
 def _topics(
@@ -275,7 +285,8 @@ def _numbers(column: Any) -> Numbers:
         if a cell has something else.
     """
     try:
-        return np.ma.filled(np.ma.asarray(column, np.float64), np.nan).ravel()
+        cells = np.asarray(column) if isinstance(column, (list, tuple)) else column  # numpy.ma looks at each of these
+        return np.ma.filled(np.ma.asarray(cells, np.float64), np.nan).ravel()
     except (TypeError, ValueError):
         texts = [str(one).strip() for one in column]
     last = next((one for one in texts if "," in one and "." in one), "")
