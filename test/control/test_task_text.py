@@ -62,39 +62,33 @@ def test_a_torque_is_a_force_of_each_joint(tmp_path: Path) -> None:
     assert [(axis.joint, axis.value) for axis in read.axes] == [(0, 1.0), (1, 2.0), (2, 3.0), (3, 4.0)]
 
 
-@pytest.mark.parametrize(
-    ("keys", "reason"),
-    [
-        ({"task": {"axes": []}}, "axes of the task is"),
-        ({"task": {"axes": [{"force": 3, **AT, "cover": "hand"}]}}, "cover is 'hand'; allowed: inner_link, outer_link"),
-        ({"task": {"axes": [{"force": 3, **AT, "contact_position": 3.0}]}}, "is 3.0 m; allowed: 0 to 0.4064 m"),
-        ({"task": {"axes": [{"position": 0, **AT}], "frame": "outer_link"}}, "turns with it"),
-        ({"task": {"axes": [{"velocity": 0.1, **AT, "contact_position": "estimated"}]}}, "for a force only"),
-        ({"posture": START, "tip": [0.5, 0.0, 0.0]}, "posture and tip are given"),
-        ({"posture": START, "torque": [0.0] * 4}, "posture and torque are given; the torque leaves no joint free"),
-        (
-            {"tip": [0.5, 0.0, 0.0], "task": {"axes": [{"position": 0, "joint": f"joint{k}"} for k in (1, 2, 3, 4)]}},
-            "tip and task are given; the task leaves no joint free to move; give one of them, or a task with fewer",
-        ),
-        ({"trajectory": {"postures": [[9.0, 0.0, 0.0, 0.0]]}}, "posture: joint1 is commanded to 9 rad"),
-    ],
-)
+@pytest.mark.parametrize(("keys", "reason"), [
+    ({"task": {"axes": []}}, "axes of the task is"),
+    ({"task": {"axes": [{"force": 3, **AT, "cover": "hand"}]}}, "cover is 'hand'; allowed: inner_link, outer_link"),
+    ({"task": {"axes": [{"force": 3, **AT, "contact_position": 3.0}]}}, "is 3.0 m; allowed: 0 to 0.4064 m"),
+    ({"task": {"axes": [{"position": 0, **AT}], "frame": "outer_link"}}, "turns with it"),
+    ({"task": {"axes": [{"velocity": 0.1, **AT, "contact_position": "estimated"}]}}, "for a force only"),
+    ({"posture": START, "tip": [0.5, 0.0, 0.0]}, "posture and tip are given"),
+    ({"posture": START, "torque": [0.0] * 4}, "posture and torque are given; the torque leaves no joint free"),
+    (
+        {"tip": [0.5, 0.0, 0.0], "task": {"axes": [{"position": 0, "joint": f"joint{k}"} for k in (1, 2, 3, 4)]}},
+        "tip and task are given; the task leaves no joint free to move; give one of them, or a task with fewer",
+    ),
+    ({"trajectory": {"postures": [[9.0, 0.0, 0.0, 0.0]]}}, "posture: joint1 is commanded to 9 rad"),
+])  # fmt: skip
 def test_what_a_file_may_not_have_is_refused_with_what_is_allowed(keys: dict, reason: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=reason):
         step_of(tmp_path, **keys)
 
 
-@pytest.mark.parametrize(
-    ("axis", "angle", "is_refused"),
-    [
-        ({"position": 0.4}, 0.4, False),
-        ({"position": 0.4}, 0.5, True),
-        ({"position": "here"}, START[0], False),
-        ({"position": "here"}, 0.3, True),
-        ({"velocity": 0.1}, 0.3, True),
-        ({"free": 5.0}, 0.3, True),
-    ],
-)
+@pytest.mark.parametrize(("axis", "angle", "is_refused"), [
+    ({"position": 0.4}, 0.4, False),
+    ({"position": 0.4}, 0.5, True),
+    ({"position": "here"}, START[0], False),
+    ({"position": "here"}, 0.3, True),
+    ({"velocity": 0.1}, 0.3, True),
+    ({"free": 5.0}, 0.3, True),
+])  # fmt: skip
 def test_a_posture_that_moves_a_joint_of_the_task_is_refused(
     axis: dict[str, Any], angle: float, is_refused: bool, tmp_path: Path
 ) -> None:
@@ -128,14 +122,11 @@ def test_a_motion_is_commanded_with_its_velocity_and_ends_at_its_goal(tmp_path: 
     assert np.gradient(postures, 0.005, axis=0)[1:-1] == pytest.approx(rates[1:-1], abs=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("step", "reason"),
-    [
-        (ScenarioStep("far", 9.0, tip=(2.0, 0.0, 0.0)), "step 'far': the goal of the tip is 2 m from the origin"),
-        (ScenarioStep("through", 9.0, tip=(0.0, 0.0, 0.0)), "step 'through': at .* of the line"),
-        (ScenarioStep("short", 0.1, trajectory=PosturePath((PathPoint((0.5, -1.0, 0.0, 0.0)),))), "seconds is 0.1"),
-    ],
-)
+@pytest.mark.parametrize(("step", "reason"), [
+    (ScenarioStep("far", 9.0, tip=(2.0, 0.0, 0.0)), "step 'far': the goal of the tip is 2 m from the origin"),
+    (ScenarioStep("through", 9.0, tip=(0.0, 0.0, 0.0)), "step 'through': at .* of the line"),
+    (ScenarioStep("short", 0.1, trajectory=PosturePath((PathPoint((0.5, -1.0, 0.0, 0.0)),))), "seconds is 0.1"),
+])  # fmt: skip
 def test_a_motion_that_cannot_be_done_fails_before_it_moves(step: ScenarioStep, reason: str) -> None:
     scenario = Scenario([step], SHARED)
     out = scenario.step(START, NO_CONTACT, 0.005)
@@ -158,15 +149,12 @@ def test_a_trajectory_message_is_matched_by_name() -> None:
     assert read == PosturePath((PathPoint((4.0, 3.0, 2.0, 1.0), (), 1.5),))
 
 
-@pytest.mark.parametrize(
-    ("given", "reason"),
-    [
-        (message(), "0 points; send 1 to"),
-        (message([1.0]), "point 0: position has 1 values; send 4"),
-        (message([float("nan")] * 4), "point 0: position of joint1 is nan"),
-        (message([0.0] * 4, names=NAMES[:3]), "name 'joint4' is missing"),
-    ],
-)
+@pytest.mark.parametrize(("given", "reason"), [
+    (message(), "0 points; send 1 to"),
+    (message([1.0]), "point 0: position has 1 values; send 4"),
+    (message([float("nan")] * 4), "point 0: position of joint1 is nan"),
+    (message([0.0] * 4, names=NAMES[:3]), "name 'joint4' is missing"),
+])  # fmt: skip
 def test_a_trajectory_message_that_is_none_is_refused(given: JointTrajectory, reason: str) -> None:
     with pytest.raises(Refused, match=reason):
         read_trajectory(given, NAMES)

@@ -6,7 +6,7 @@ may have: the mistake that explains them much better is the likely cause.
 
 from collections.abc import Iterator
 from enum import StrEnum
-from itertools import combinations
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,11 @@ class Mistake(StrEnum):
     SCALED_MOTOR = (
         "the torques of {about} are {size:.2g} times those of the configuration: sign, unit or torque constant?"
     )
-    SWAPPED = "the torques fit if the names of the motors {about} are exchanged"
+    SWAPPED = "the torques fit if the names of the motors {about} are exchanged."
+    TURNED = "the torques fit if {about} has the other sign, in angle, velocity and effort."
+    PAYLOAD = (
+        "the torques fit with {size:.2g} kg at the tool: declare it as arm.payload, unless something touched the arm."
+    )
     # the torques of a motor are not those of any arm
     UNEXPLAINED = (
         "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm, is its base tilted, "
@@ -92,9 +96,17 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
         tried.append((_misfit(one * model, torque, used), mistake))
     # a factor that a torque constant or a mass may be wrong by is no mistake
     tried = [one for one in tried if not 1.0 / IDENTIFY.heavier < one[1].size < IDENTIFY.heavier]
-    for pair in combinations(range(len(motors)), 2):
-        mistake = Contradiction(Mistake.SWAPPED, tuple(motors[i] for i in pair), 1.0)
-        tried.append((_misfit(*_torques(shared, unknowns, _swapped(motion, *pair))), mistake))
+    of_payload = Regressor(shared, unknowns, motion).payload_torque
+    payload = shared.arm.payload + (more := _ratio(of_payload, torque - model, used))
+    if payload > 0.0:
+        there = Contradiction(Mistake.PAYLOAD, (), payload)
+        tried.append((_misfit(model + more * of_payload, torque, used), there))
+    for i, j in combinations_with_replacement(range(len(motors)), 2):
+        change = np.eye(len(motors))
+        change[[i, j]] = change[[j, i]] if i < j else -change[[i, i]]
+        changed = motion._replace(**{name: one @ change for name, one in motion._asdict().items() if one.ndim > 1})
+        mistake = Contradiction(Mistake.SWAPPED if i < j else Mistake.TURNED, tuple({motors[i]: 1, motors[j]: 1}), 1.0)
+        tried.append((_misfit(*_torques(shared, unknowns, changed)), mistake))
     least, cause = min(tried, key=lambda one: one[0])
     is_clear = as_recorded > IDENTIFY.misfit and least < SHAFT.much_better * as_recorded
     return cause if is_clear else None
@@ -117,11 +129,3 @@ def _ratio(model: Numbers, torque: Numbers, used: Mask) -> float:
     """How many times the torques of the model the recorded ones are; 1 where that is not known."""
     square = float((model**2 * used).sum())
     return float((model * torque * used).sum()) / square if square else 1.0
-
-
-def _swapped(motion: MotionSamples, i: int, j: int) -> MotionSamples:
-    """The motion with two motors in each other's place."""
-    order = np.arange(motion.theta.shape[1])
-    order[[i, j]] = j, i
-    values = {name: value[..., order] for name, value in motion._asdict().items() if value.ndim > 1}
-    return motion._replace(**values)

@@ -63,6 +63,8 @@ class Regressor:
         body = RigidBody(shared.arm)
         links = np.array([body.inverse_dynamics_regressor(*state) for state in zip(q, qd, qdd, strict=True)])
         self._links = np.einsum("ji,kjp->kip", self._matrix, links)
+        point = np.array(shared.arm.tool)
+        self._at_tool = about_origin(np.array([1.0, *point, 0.0, 0.0, 0.0]), (0.0, 0.0, 0.0))  # of 1 kg there
         rest = np.zeros(qd.shape[1])
         self._weights = np.array([body.inverse_dynamics_regressor(each, rest, rest) for each in q])
         self._carried = (qdd * shared.model.joints.armature) @ self._matrix
@@ -175,6 +177,11 @@ class Regressor:
             for at, j in zip(unknowns.places(group), unknowns.joints, strict=True):
                 columns[:, :, at] = mean[:, j, None] * matrix[j]
 
+    @property
+    def payload_torque(self) -> Numbers:
+        """Torques of the motors, (k, n), by 1 kg at the tool, N m/kg."""
+        return np.asarray(self._links[:, :, -10:] @ self._at_tool, np.float64)
+
     def _inertial(self, values: Numbers) -> tuple[list[int], Numbers, Numbers]:
         """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""
         unknowns, links = self.unknowns, self._shared.arm.links
@@ -190,6 +197,7 @@ class Regressor:
             rows, own = slice(10 * i, 10 * i + 10), np.arange(7) * n + i
             jacobian[rows, own] = slope
             constant[rows] = about_origin(link, product) - slope @ link
+        constant[-10:] += self._shared.arm.payload * self._at_tool
         return at.ravel().tolist(), jacobian, constant
 
 

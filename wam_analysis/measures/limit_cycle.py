@@ -71,7 +71,7 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
     folded = _fold(flat, phase, phases)
     if math.isnan(period) and n >= 2 * CYCLE.cycles * lag:
-        double = _fold(flat, 0.5 * np.arange(n) / lag % 1.0, phases)
+        double = _fold(flat, np.arange(n) / (2.0 * lag) % 1.0, phases)
         if 1.0 - double.explained < SHAFT.much_better * (1.0 - folded.explained):  # every other cycle is alike
             return limit_cycle(time, value, 2.0 * lag * seconds)
     half = n // 2

@@ -96,13 +96,13 @@ def run(given: argparse.Namespace) -> int:
         print(f"NOT A POSSIBLE MODEL: {impossible}\n")  # before a report of many lines, and as the last line
     print(report(shared, found, str(bag)), flush=True)
     _warn(run_in_bag, against)
-    if impossible:
-        raise ParameterError(impossible)
     if against and not given.force:
         raise ValueError(
             f"{bag} contradicts the configuration, so no model is written: {against[0]} Correct the recording or the "
             "configuration; --force writes the model anyway"
         )
+    if impossible:
+        raise ParameterError(impossible)
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         folder, base = given.write.resolve().parent, given.config
