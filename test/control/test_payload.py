@@ -66,6 +66,18 @@ def test_the_estimator_feels_nothing_of_it() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("most", [0.0, 0.6])
+def test_a_mass_that_joint_sensors_feel_in_motion_is_no_contact(most: float) -> None:
+    places = ([0.0, -1.2, 0.0, 1.0], [0.8, -0.6, 0.4, 1.4], [-0.6, -1.4, -0.3, 0.3])
+    steps = [ScenarioStep("release", 0.3, request="enable"), *(ScenarioStep("go", 1.5, posture=q) for q in places)]
+    values = {"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": [0.0, most]}
+    run, found = Simulation(CONFIGURATION.with_values(values), steps), []
+    while not run.step():
+        found += [sum(one.probability for one in run.estimate.hypotheses)] * run.estimate.in_contact
+    assert not found if most else np.median(found) < 0.1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "side", "force"), [(0.1, -1.0, 10.0), (2.0, 1.0, 30.0)])
 def test_a_force_is_refused_by_the_mass_that_nobody_knows_of(mass: float, side: float, force: float) -> None:
     """10 N were 11.2 N with 0.1 kg, and 13.5 N with 0.3 kg, without a reason."""

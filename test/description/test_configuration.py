@@ -82,45 +82,39 @@ def test_sections_cannot_be_written(file: Path) -> None:
         Configuration.load(file).sections["loop"]["gain"] = 1.0  # type: ignore[index]
 
 
-@pytest.mark.parametrize(
-    ("key", "message"),
-    [
-        ("timing.mod", r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'"),
-        ("loop:gian", r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; did you mean 'loop:gain'"),
-        ("lop:gain", r"mine\.yaml: no section '/\*\*/lop' for node 'lop'; sections: .*loop"),
-    ],
-)
+@pytest.mark.parametrize(("key", "message"), [
+    ("timing.mod", r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'"),
+    ("loop:gian", r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; did you mean 'loop:gain'"),
+    ("lop:gain", r"mine\.yaml: no section '/\*\*/lop' for node 'lop'; sections: .*loop"),
+])  # fmt: skip
 def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         Configuration.load(file).with_values({key: 1})
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("a: [1,", "is not YAML"),
-        ("/**: !!map x", "is not YAML: one of its values cannot be read"),
-        ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
-        (
-            "/**:\n  ros__parameters:\n    a: &a [*a]",
-            r"is not YAML: \*a is inside of what it refers to.*\n  in \".*\.yaml\", line 3",
-        ),
-        ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
-        (
-            "/**:\n  ros__parameters:\n    a: {b: {}, c: 1}",
-            "section '/.*': 'a.b' is empty; give it a value, or leave it",
-        ),
-        ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
-        ("", r"has no section '/\*\*'"),
-        ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
-        ("bsae: wam", r"has the key 'bsae'; did you mean 'base'\?"),
-        ("steps: []", r"is a scenario, no configuration; play it with 'wam up --scenario /.*/odd\.yaml'"),
-        ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
-        ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
-        ("driver: {ros__parameters: {}}\n/**: {ros__parameters: {}}", r"section 'driver' is not allowed; write"),
-        ("/**/a/b: {ros__parameters: {}}\n/**: {ros__parameters: {}}", r"section '/\*\*/a/b' is not allowed; write"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ("a: [1,", "is not YAML"),
+    ("/**: !!map x", "is not YAML: one of its values cannot be read"),
+    ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
+    (
+        "/**:\n  ros__parameters:\n    a: &a [*a]",
+        r"is not YAML: \*a is inside of what it refers to.*\n  in \".*\.yaml\", line 3",
+    ),
+    ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
+    (
+        "/**:\n  ros__parameters:\n    a: {b: {}, c: 1}",
+        "section '/.*': 'a.b' is empty; give it a value, or leave it",
+    ),
+    ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
+    ("", r"has no section '/\*\*'"),
+    ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
+    ("bsae: wam", r"has the key 'bsae'; did you mean 'base'\?"),
+    ("steps: []", r"is a scenario, no configuration; play it with 'wam up --scenario /.*/odd\.yaml'"),
+    ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
+    ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
+    ("driver: {ros__parameters: {}}\n/**: {ros__parameters: {}}", r"section 'driver' is not allowed; write"),
+    ("/**/a/b: {ros__parameters: {}}\n/**: {ros__parameters: {}}", r"section '/\*\*/a/b' is not allowed; write"),
+])  # fmt: skip
 def test_file_that_is_no_configuration_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "odd.yaml"
     path.write_text(text)
@@ -171,17 +165,14 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
     assert Configuration.load(other).sections["mine"] == {"gain": 3.0}
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
-        ("base: odd.yaml\n", "base is the file itself"),
-        ("base: wam\n/**/drivr: {ros__parameters: {a: 2}}\n", r"section '/\*\*/drivr' belongs to no node in 'nodes'"),
-        (packaged("wam").read_text() + LOOP, r"section '/\*\*/loop' comes after '/\*\*'"),  # it would win over -p
-        ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
-        ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
+    ("base: odd.yaml\n", "base is the file itself"),
+    ("base: wam\n/**/drivr: {ros__parameters: {a: 2}}\n", r"section '/\*\*/drivr' belongs to no node in 'nodes'"),
+    (packaged("wam").read_text() + LOOP, r"section '/\*\*/loop' comes after '/\*\*'"),  # it would win over -p
+    ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
+    ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
+])  # fmt: skip
 def test_sections_that_do_not_fit_are_refused(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "odd.yaml"
     path.write_text(text)
@@ -209,19 +200,16 @@ def test_the_section_of_a_node_without_parameters_is_empty(tmp_path: Path) -> No
 IN_PLACE = "a value that you set, section '/**': "
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"nodes": []}, f"{IN_PLACE}parameter 'nodes' is empty; list the nodes to start, for example"),
-        ({"timing.real_time_factor": 9e-4}, "timing.real_time_factor is 0.0009; allowed: 0.001 to 100, or 0 for"),
-        ({"timing.outer_divisor": 36, "ages.feedback": 0.035}, "ages.feedback is 0.035 s, less than an outer period"),
-        ({"arm.tool": [0.3, 0.0, 0.0]}, "outer_link ends at (0.4064, 0, 0) m"),
-        ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
-        ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
-        ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "arm.covers.start and end reach up to 0.5 m"),
-        ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "allowed: (0, 0, 0), or (0, 0, -0.7), where joint3 begins"),
-    ],
-)
+@pytest.mark.parametrize(("values", "message"), [
+    ({"nodes": []}, f"{IN_PLACE}parameter 'nodes' is empty; list the nodes to start, for example"),
+    ({"timing.real_time_factor": 9e-4}, "timing.real_time_factor is 0.0009; allowed: 0.001 to 100, or 0 for"),
+    ({"timing.outer_divisor": 36, "ages.feedback": 0.035}, "ages.feedback is 0.035 s, less than an outer period"),
+    ({"arm.tool": [0.3, 0.0, 0.0]}, "outer_link ends at (0.4064, 0, 0) m"),
+    ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
+    ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
+    ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "arm.covers.start and end reach up to 0.5 m"),
+    ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "allowed: (0, 0, 0), or (0, 0, -0.7), where joint3 begins"),
+])  # fmt: skip
 def test_values_that_do_not_fit_each_other_are_refused_with_the_others_to_change(
     values: dict[str, Any], message: str
 ) -> None:
@@ -237,36 +225,30 @@ def test_values_at_their_bounds_a_longer_link_whose_numbers_meet_and_a_tool_beyo
     assert WAM.with_values({**longer, "arm.tool": [0.6, 0.0, 0.0]}).shared.arm.covers.length == (0.5588, 0.5)
 
 
-@pytest.mark.parametrize(
-    ("value", "reason"),
-    [
-        ("{a: 1, a: 2}", "'a' is given twice; remove one of the two"),
-        ("[" * 3000, "nested more than 50 levels deep"),
-        ("2001-99-99", "one of its values cannot be read: month must be in 1..12"),
-        ("9" * 5000, "one of its values cannot be read"),
-        ("0x" + "f" * 5000, "a number of 5002 digits is beyond every float"),
-        ("\udcff", "cannot be read: .utf-8. codec"),
-        ("&a [*a]", r"\*a is inside of what it refers to"),
-        ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
-        ("[1.0, 1:30]", "1:30 is 90 in YAML"),
-    ],
-)
+@pytest.mark.parametrize(("value", "reason"), [
+    ("{a: 1, a: 2}", "'a' is given twice; remove one of the two"),
+    ("[" * 3000, "nested more than 50 levels deep"),
+    ("2001-99-99", "one of its values cannot be read: month must be in 1..12"),
+    ("9" * 5000, "one of its values cannot be read"),
+    ("0x" + "f" * 5000, "a number of 5002 digits is beyond every float"),
+    ("\udcff", "cannot be read: .utf-8. codec"),
+    ("&a [*a]", r"\*a is inside of what it refers to"),
+    ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
+    ("[1.0, 1:30]", "1:30 is 90 in YAML"),
+])  # fmt: skip
 def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: str, reason: str) -> None:
     with pytest.raises(ParameterError, match=rf"--set loop:gain: '.*' is no value of YAML: .*{reason}") as refusal:
         option_values([f"loop:gain={value}"])
     assert len(str(refusal.value)) < 300
 
 
-@pytest.mark.parametrize(
-    ("value", "hint"),
-    [
-        ("1e-3", "; YAML reads '1e-3' as a text: write 0.001"),
-        (".5e3", "; YAML reads '.5e3' as a text: write 500"),
-        ("'4'", "; YAML reads '4' as a text: write 4"),
-        ("fast", ""),
-        ("nan", ""),
-    ],
-)
+@pytest.mark.parametrize(("value", "hint"), [
+    ("1e-3", "; YAML reads '1e-3' as a text: write 0.001"),
+    (".5e3", "; YAML reads '.5e3' as a text: write 500"),
+    ("'4'", "; YAML reads '4' as a text: write 4"),
+    ("fast", ""),
+    ("nan", ""),
+])  # fmt: skip
 def test_a_text_that_looks_like_a_number_is_refused_with_what_to_write(value: str, hint: str) -> None:
     read = option_values([f"gain={value}"])["gain"]
     with pytest.raises(ParameterError) as refusal:

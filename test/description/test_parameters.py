@@ -57,27 +57,24 @@ GOOD: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"speed": 1.0}, "unknown parameter 'speed'"),
-        ({"inner.gain": None, "inner.gian": 0.5}, "missing parameter 'inner.gain'; unknown parameter 'inner.gian'"),
-        ({"count": None, "mode": None}, "missing parameter 'mode'; missing parameter 'count'"),
-        ({"mode": "medium"}, "parameter 'mode' is 'medium'; allowed: one of soft, hard"),
-        ({"mode": 3}, "parameter 'mode' is 3; allowed: one of soft, hard, in quotes, in a shell as \"'a'\""),
-        ({"count": 0}, "parameter 'count' is 0; allowed: 1 to 9"),
-        ({"count": 2.5}, "parameter 'count' is 2.5; allowed: a whole number"),
-        ({"count": True}, "parameter 'count' is True; allowed: a number"),
-        ({"is_on": "yes"}, "parameter 'is_on' is 'yes'; allowed: true, false"),
-        ({"inner.gain": math.nan}, "parameter 'inner.gain' is nan 1/s; allowed: 0 to 2"),
-        ({"inner.gain": -0.1}, "parameter 'inner.gain' is -0.1 1/s; allowed: 0 to 2"),
-        ({"inner.gain": "0.5"}, "parameter 'inner.gain' is '0.5' 1/s; allowed: a number"),
-        ({"inner.weights": [1.0, math.nan]}, "parameter 'inner.weights' is nan kg; allowed: 0 to 1e.09"),
-        ({"inner.weights": 1.0}, "parameter 'inner.weights' is 1.0; it must be a list of float"),
-        ({"inner.names": "ab"}, "parameter 'inner.names' is 'ab'; it must be a list of str"),
-        ({"inner.weights": [1.0]}, "2 names, 1 weights"),
-    ],
-)
+@pytest.mark.parametrize(("change", "text"), [
+    ({"speed": 1.0}, "unknown parameter 'speed'"),
+    ({"inner.gain": None, "inner.gian": 0.5}, "missing parameter 'inner.gain'; unknown parameter 'inner.gian'"),
+    ({"count": None, "mode": None}, "missing parameter 'mode'; missing parameter 'count'"),
+    ({"mode": "medium"}, "parameter 'mode' is 'medium'; allowed: one of soft, hard"),
+    ({"mode": 3}, "parameter 'mode' is 3; allowed: one of soft, hard, in quotes, in a shell as \"'a'\""),
+    ({"count": 0}, "parameter 'count' is 0; allowed: 1 to 9"),
+    ({"count": 2.5}, "parameter 'count' is 2.5; allowed: a whole number"),
+    ({"count": True}, "parameter 'count' is True; allowed: a number"),
+    ({"is_on": "yes"}, "parameter 'is_on' is 'yes'; allowed: true, false"),
+    ({"inner.gain": math.nan}, "parameter 'inner.gain' is nan 1/s; allowed: 0 to 2"),
+    ({"inner.gain": -0.1}, "parameter 'inner.gain' is -0.1 1/s; allowed: 0 to 2"),
+    ({"inner.gain": "0.5"}, "parameter 'inner.gain' is '0.5' 1/s; allowed: a number"),
+    ({"inner.weights": [1.0, math.nan]}, "parameter 'inner.weights' is nan kg; allowed: 0 to 1e.09"),
+    ({"inner.weights": 1.0}, "parameter 'inner.weights' is 1.0; it must be a list of float"),
+    ({"inner.names": "ab"}, "parameter 'inner.names' is 'ab'; it must be a list of str"),
+    ({"inner.weights": [1.0]}, "2 names, 1 weights"),
+])  # fmt: skip
 def test_a_set_with_something_wrong_is_refused_by_name(change: dict[str, Any], text: str) -> None:
     flat = {name: value for name, value in {**GOOD, **change}.items() if value is not None}
     with pytest.raises(ParameterError, match=text):
@@ -199,22 +196,19 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
     assert [list(value.double_array_value) for value in answer.values] == [lower]
 
 
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({"force_gain": [0.02], "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
-        ({"force_gain": [0.02], "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
-        ({"force_gain": [0.02], "posture_gain": math.nan}, "posture_gain"),
-        ({"force_gain": [0.02], "posture_gain": "much"}, "'posture_gain' is 'much' 1/s; allowed: a number"),
-        ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
-        (
-            {"force_gain": [0.02], "force_gian": 0.02},
-            "unknown parameter 'force_gian'; did you mean 'force_gain'? while node force_loop runs, these may",
-        ),
-        ({"force_gain": [0.5], "guard.mode": "refuse"}, "times the largest linearly stable one"),
-        ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
-    ],
-)
+@pytest.mark.parametrize(("given", "text"), [
+    ({"force_gain": [0.02], "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+    ({"force_gain": [0.02], "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
+    ({"force_gain": [0.02], "posture_gain": math.nan}, "posture_gain"),
+    ({"force_gain": [0.02], "posture_gain": "much"}, "'posture_gain' is 'much' 1/s; allowed: a number"),
+    ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
+    (
+        {"force_gain": [0.02], "force_gian": 0.02},
+        "unknown parameter 'force_gian'; did you mean 'force_gain'? while node force_loop runs, these may",
+    ),
+    ({"force_gain": [0.5], "guard.mode": "refuse"}, "times the largest linearly stable one"),
+    ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
+])  # fmt: skip
 def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, Any], text: str, ros: Any) -> None:
     node = make(ros, "force_loop")
     before = node.node._loop.parameters
@@ -227,19 +221,16 @@ def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, An
     assert node.node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
 
 
-@pytest.mark.parametrize(
-    ("node", "given", "text"),
-    [
-        ("velocity_loop", {"servo.proportional_gain": [0.01] * 4}, "servo.proportional_gain' is chosen at the start"),
-        ("velocity_loop", {"ages.command": 0.5}, "ages.command"),
-        ("force_loop", {"force_gain": [1e308]}, "allowed: 0 to "),
-        ("force_loop", {"force_gain": [0.1] * 2}, "has 2 values; give 3, one for each of"),
-        ("force_loop", {"force_limit": 1e308}, "force_limit"),
-        ("force_loop", {"joint_speed_limit": 9.0}, "joint_speed_limit"),
-        ("force_loop", {"limits.settling_time": 0.0}, "limits.settling_time' is 0.0 s; allowed: 0.001 to "),
-        ("force_loop", {"contact_position": 0.9}, "contact_position is 0.9 m; allowed: 0 to 0.4064, on outer_link"),
-    ],
-)
+@pytest.mark.parametrize(("node", "given", "text"), [
+    ("velocity_loop", {"servo.proportional_gain": [0.01] * 4}, "servo.proportional_gain' is chosen at the start"),
+    ("velocity_loop", {"ages.command": 0.5}, "ages.command"),
+    ("force_loop", {"force_gain": [1e308]}, "allowed: 0 to "),
+    ("force_loop", {"force_gain": [0.1] * 2}, "has 2 values; give 3, one for each of"),
+    ("force_loop", {"force_limit": 1e308}, "force_limit"),
+    ("force_loop", {"joint_speed_limit": 9.0}, "joint_speed_limit"),
+    ("force_loop", {"limits.settling_time": 0.0}, "limits.settling_time' is 0.0 s; allowed: 0.001 to "),
+    ("force_loop", {"contact_position": 0.9}, "contact_position is 0.9 m; allowed: 0 to 0.4064, on outer_link"),
+])  # fmt: skip
 def test_a_value_that_cannot_be_taken_while_the_node_runs_is_refused(
     ros: Any, node: str, given: dict[str, Any], text: str
 ) -> None:
@@ -290,20 +281,17 @@ def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return ran("-m", "wam_cli.program", "node", name, *arguments, timeout=LONG, cwd=ROOT, env=environment)
 
 
-@pytest.mark.parametrize(
-    ("name", "right", "wrong", "text"),
-    [
-        ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
-        ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
-        (
-            "force_loop",
-            "force_limit: 60.0",
-            "force_limit: 1e9",
-            "parameter 'force_limit' is 1000000000.0 N; allowed: 0 to 1000",
-        ),
-        ("transform", "mode: lockstep", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of lockstep"),
-    ],
-)
+@pytest.mark.parametrize(("name", "right", "wrong", "text"), [
+    ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
+    ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
+    (
+        "force_loop",
+        "force_limit: 60.0",
+        "force_limit: 1e9",
+        "parameter 'force_limit' is 1000000000.0 N; allowed: 0 to 1000",
+    ),
+    ("transform", "mode: lockstep", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of lockstep"),
+])  # fmt: skip
 def test_a_wrong_parameter_stops_the_process_with_its_name(
     name: str, right: str, wrong: str, text: str, tmp_path: Path, domain_id: int
 ) -> None:

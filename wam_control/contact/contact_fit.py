@@ -46,7 +46,8 @@ class Fit(NamedTuple):
     low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
     along : probability that the force is along the tube, of a contact on this link.
     force : (2,), N, most likely components across the link at `position`.
-    force_sd : N, standard deviation of the size of the force, the position unknown.
+    force_sd : N, standard deviation of the size of the force, the position unknown, and whether it is along the tube if
+        `along` is above 0.5.
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
     torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
         and force; infinite where they do not determine it.
@@ -219,7 +220,7 @@ class ContactFit:
         """
         grams: list[Gram] = gram.tolist()
         links = [self._link(i, one) for i, one in enumerate(grams)]
-        pieces, left = self._along(grams[-1])
+        pieces, axial, left = self._along(grams[-1])
         for i, link in enumerate(links):
             pieces += self._grid(i, link)
         pieces.sort(reverse=True)
@@ -228,7 +229,7 @@ class ContactFit:
         parts, total = self._parts(pieces)
         total += math.exp(min(other - pieces[0][0], CONTACT.largest_exponent))
         each = zip(links, parts, self._ends, strict=True)
-        return [self._fit(link, part, total, ends, left) for link, part, ends in each]
+        return [self._fit(link, part, total, ends, axial, left) for link, part, ends in each]
 
     def _link(self, i: int, gram: Gram) -> _Link:
         """A link with the tangential force in the covariance, of the size at the likeliest of some places.
@@ -274,11 +275,11 @@ class ContactFit:
         constant, width = link.constant + self._end_frequency, CONTACT.end_length
         return pieces + [(link.log_density(x) + constant, x, width, i, False) for x in self._meeting[i]]
 
-    def _along(self, gram: Gram) -> tuple[list[Piece], float]:
+    def _along(self, gram: Gram) -> tuple[list[Piece], float, float]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
-        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns what the
-        best of them does not explain, chi^2, too.
+        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns its size,
+        N, and what the best of them does not explain, chi^2, too.
         """
         scale, precision, (_, end) = self._given.force_scale, self._precision, self._ends[-1]
         r, a1, a2, b1, b2, _, axial = gram
@@ -296,7 +297,7 @@ class ContactFit:
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
             found.append((value + frequency, x, width, len(self._ends) - 1, True))
             left = min(left, rr - ra * ra / (aa + precision))
-        return found, left
+        return found, size, left
 
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
         """What the pieces, the most probable first, are of each link, and the sum of their weights."""
@@ -323,11 +324,11 @@ class ContactFit:
                 part.low, part.high = min(low, part.low), max(high, part.high)  # in this order never a NaN
         return parts, total
 
-    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, left: float) -> Fit:
+    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, axial: float, left: float) -> Fit:
         start, end = ends
         is_along, rest = part.along > 0.5 * part.mass, part.mass - part.along
-        place = part.first_along / part.along if is_along else (part.first - part.first_along) / rest
-        place = min(max(place, start), end)
+        side = min(max((part.first - part.first_along) / max(rest, CONTACT.negligible), start), end)
+        place = min(max(part.first_along / part.along, start), end) if is_along else side
         variance = max(0.0, (part.second - 2.0 * place * part.first) / part.mass + place * place)
         explained, force, (s11, s12, s22) = link.force(place)
         step = 0.5 * (end - start) / self._given.positions
@@ -337,6 +338,9 @@ class ContactFit:
         u1, u2 = force[0] / size, force[1] / size
         s11, s12, s22 = s11 + d1 * d1 * variance, s12 + d1 * d2 * variance, s22 + d2 * d2 * variance
         radial = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22
+        if is_along:  # or it is across, elsewhere: the force that is likeliest here is neither
+            across = math.hypot(*link.force(side)[1])
+            radial += (part.along * (axial - size) ** 2 + rest * (across - size) ** 2) / part.mass
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22
         return Fit(
             probability=part.mass / total,

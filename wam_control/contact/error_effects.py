@@ -63,7 +63,7 @@ class GaugeEffects:
 
     def __init__(self, n: int, parameters: ObserverParameters, links: LinkEffects) -> None:
         self._lasting = np.diag(np.full(n, parameters.joint_torque_sd))
-        self._rest, self._still = np.square(self._lasting), np.zeros(n)
+        self._rest = np.square(self._lasting)
         self._links, self._payload = links, parameters.payload[0]
 
     def observation(self, motion: FilteredMotion, *_: object) -> Observation:
@@ -71,7 +71,7 @@ class GaugeEffects:
         n = len(motion.model)
         effects = np.zeros((n, 4 * n + 1))
         effects.ravel()[:: 4 * n + 2] = motion.model  # the diagonal
-        effects[:, n:] = self._links.of(motion.pose, self._still, self._still)
+        effects[:, n:] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
         residual = motion.residual - self._payload * effects[:, -1]
         moving = motion.signals  # there are none
         return Observation(residual, effects, self._rest, moving, motion.pose, self._lasting)

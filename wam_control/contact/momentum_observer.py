@@ -87,7 +87,7 @@ class MomentumObserver:
             GaugeEffects(n, parameters, links) if use_joint_sensors else ErrorEffects(side, times, links)
         )
         prior = model_prior(arm, parameters, model, use_joint_sensors)
-        self._may_carry = prior.limit[-1] > 0.0 or parameters.payload[1] > 0.0
+        self._may_carry = use_joint_sensors or prior.limit[-1] > 0.0 or parameters.payload[1] > 0.0
         noise = (parameters.motor_noise * side.friction.dynamic[:n]) ** 2
         self._errors = ModelErrors(
             prior, parameters.drift, side.map.motor_from_joint.T, noise, parameters.motor_torque_sd**2
@@ -176,12 +176,10 @@ class MomentumObserver:
             if friction:
                 resisted = map(add, friction, last.friction)
                 external = [each + 0.5 * twice for each, twice in zip(external, resisted)]  # noqa: B905
-        present = [*external, *model, *q]
+        present = [*external, *model, *q, *qd, *(change / span for change in map(sub, qd, before))]
         if not math.isfinite(sum(momentum, sum(present))):
             self._gap += dt
             return False
-        if friction:
-            present += [*qd, *(change / span for change in map(sub, qd, before))]
         self._filters.take(present, signals, span)
         self._last, self._gap = _Sample(q, qd, momentum, inertia, bias, friction, links), 0.0
         self.age += span
