@@ -22,7 +22,7 @@ class MotionThresholds:
     shortest: float = 1e-6  # s, of a part of a trajectory: its fifth power is a number, too
     longest: float = 1e6  # s, of a part of a trajectory
     slowest_chirp: float = 1e-6  # Hz; the ratio of two frequencies is a number, too
-    fastest_chirp: float = 1e6  # Hz
+    fastest_chirp: float = 500.0  # Hz: half of the usual inner rate
 
 
 @dataclass(frozen=True, slots=True)

@@ -439,8 +439,9 @@ def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) 
             read(set=body)
     with pytest.raises(ParameterError, match="it must begin above 0 and rise"):
         read(force=force, chirp={"newtons": 1, "from": 9, "to": 2})
-    with pytest.raises(ParameterError, match="chirp needs a force above 0 N"):
-        read(chirp={"newtons": 1, "from": 2, "to": 9})
+    for given, text in ({}, "it has 0 N"), ({"force": {**force, "newtons": [0, 0, -5]}}, "a chirp of 8 N needs .* 5 N"):
+        with pytest.raises(ParameterError, match=text):
+            read(chirp={"newtons": 8, "from": 2, "to": 9}, **given)
 
 
 QUICK = """

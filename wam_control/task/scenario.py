@@ -552,7 +552,8 @@ def _require_step(where: str, step: Any, shared: Shared) -> None:
         numbers(where, key, values, 3)
     if step.chirp is not None:
         _require_chirp(where, step.chirp)
-        require(any(step.force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
+        force, swing = math.hypot(*step.force.force), abs(step.chirp.newtons)
+        require(0.0 < force >= swing, f"{where}: a chirp of {swing:g} N needs a force of as much; it has {force:g} N")
     require_list(where, "posture", step.posture, "joint angles")
     if step.tip is not None:
         triple(where, "tip", step.tip)
