@@ -102,7 +102,7 @@ class ErrorEffects:
         self._differs = np.eye(n) - common / np.maximum(1.0, common.sum(axis=1))
         self._to_joints = inverse.T
 
-    def observation(self, motion: FilteredMotion, inertia: Array, which: int) -> Observation:
+    def observation(self, motion: FilteredMotion, inertia: Array, which: int, errors: Array) -> Observation:
         """The residual, the effects of the errors on it, and the covariance of the rest.
 
         Parameters
@@ -110,6 +110,7 @@ class ErrorEffects:
         motion : with the signals of the shafts.
         inertia : (n, n), kg m^2.
         which : of the filters.
+        errors : of the model as tracked, (k,): a shaft with more friction in motion has more at rest, too.
         """
         n, given, time = self._n, self._side.parameters, self._times[which]
         residual, model, signals = motion.residual, motion.model, motion.signals
@@ -143,6 +144,7 @@ class ErrorEffects:
         residual = residual - given.payload[0] * effects[:, -1]
         at_rest, shape = self._sds
         variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved
+        variance *= np.square(np.maximum(1.0 + 0.5 * (errors[: 2 * n] + errors[2 * n : 4 * n]), 1.0))
         lasting = self._through * np.sqrt(variance)
         less = self._times[0] / time  # a faster filter averages less of what is noise
         variance[:n] += less * (given.motor_torque_sd**2 + np.square(given.motor_torque_fraction * modelled))

@@ -229,7 +229,7 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        return self._effects.observation(self._filters.motion(which), self._last.inertia, which)
+        return self._effects.observation(self._filters.motion(which), self._last.inertia, which, self._errors.errors)
 
     def zero(self, detect: float) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
