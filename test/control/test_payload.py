@@ -65,16 +65,28 @@ def test_the_estimator_feels_nothing_of_it() -> None:
         assert (max(map(abs, observer.torques()[0])) > 0.5) == feels
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("most", [0.0, 0.6])
-def test_a_mass_that_joint_sensors_feel_in_motion_is_no_contact(most: float) -> None:
+def contacts(values: dict[str, object]) -> list[float]:
+    """Probability of a link in each period of a free motion with a rest that has a contact."""
     places = ([0.0, -1.2, 0.0, 1.0], [0.8, -0.6, 0.4, 1.4], [-0.6, -1.4, -0.3, 0.3])
-    steps = [ScenarioStep("release", 0.3, request="enable"), *(ScenarioStep("go", 1.5, posture=q) for q in places)]
-    values = {"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": [0.0, most]}
-    run, found = Simulation(CONFIGURATION.with_values(values), steps), []
+    steps = [*(ScenarioStep("go", 1.5, posture=q) for q in places), ScenarioStep("rest", 1.2)]
+    free = {"driver:world.obstacles.positions": [5.0, 0.0, -2.0]}
+    run, found = Simulation(CONFIGURATION.with_values(free | values), [steps[0]._replace(request="enable"), *steps]), []
     while not run.step():
         found += [sum(one.probability for one in run.estimate.hypotheses)] * run.estimate.in_contact
-    assert not found if most else np.median(found) < 0.1
+    return found
+
+
+@pytest.mark.slow
+def test_a_mass_that_joint_sensors_feel_in_motion_is_no_contact() -> None:
+    for most in (0.0, 0.6):
+        found = contacts({"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": [0.0, most]})
+        assert not found if most else np.median(found) < 0.1
+
+
+@pytest.mark.slow
+def test_friction_above_that_of_the_model_is_no_contact_at_rest() -> None:
+    more = {"driver:mismatch.motor_friction": [1.2] * 4, "driver:mismatch.joint_friction": [1.2] * 4}
+    assert contacts({**more, "contact_estimator:use_joint_sensors": False}) == []
 
 
 @pytest.mark.slow
