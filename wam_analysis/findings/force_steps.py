@@ -180,7 +180,7 @@ def _tared(measured: Source, command: Source | None) -> str:
     size = shown(float(np.max(np.linalg.norm(moves[:, rows], axis=0))), "N")
     return (
         f"{measured.label}: the force jumps from one message to the next {when(force.time[rows])}, by up to {size}, "
-        "as by a tare or an impact."
+        "as by a tare, an impact or a lost contact."
     )
 
 

@@ -40,7 +40,7 @@ class FoundCycle(NamedTuple):
 
 def repetition_section(recording: AnalysedRecording) -> Section:
     """What repeats, and whether it was commanded."""
-    findings, cycling, taken = list[Finding](), defaultdict[str, list[tuple[float, str]]](list), set[str]()
+    findings, cycling, taken = list[Finding](), defaultdict[str, list[tuple[float, str, str]]](list), set[str]()
     alike: dict[str, list[str]] = {origin: [] for origin in ORIGINS}
     for one, quantity, label in traced(recording.states):
         unit, command = one.units[quantity], recording.command_of(one)
@@ -60,7 +60,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                     at = shown(frequency, "Hz")
                     text = f"{name} repeats at {at}, {shown(cycle.peak_to_peak, unit)} peak to peak"
                     text += changes + ", not commanded" * (origin == LIMIT_CYCLE)
-                    cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text))
+                    cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text, label))
                 findings += [
                     Finding(f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=origin, error=error),
                     Finding(f"{name}: frequency", "Hz", frequency, note=origin),
@@ -71,10 +71,10 @@ def repetition_section(recording: AnalysedRecording) -> Section:
     which = "that was not commanded" if recording.commands else "in this recording"
     sentences = [f"{', '.join(names)}: {ORIGINS[origin]}." for origin, names in alike.items() if names]
     stated = sentences or [f"Nothing {which} was found to repeat five times without a gap."]
-    shows = [
-        f"{max(those)[1]}{f', and {len(those) - 1} more at this frequency' * (len(those) > 1)}."
-        for those in cycling.values()
-    ]
+    shows = []
+    for those in cycling.values():
+        others = len({label for *_, label in those}) - 1
+        shows.append(f"{max(those)[1]}{f', and {others} more at this frequency' * (others > 0)}.")
     return Section("stability", "Cycles", stated, findings, shows)
 
 
