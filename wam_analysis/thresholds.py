@@ -105,6 +105,7 @@ class CycleThresholds:
     # of a size: a cycle whose second half has less of the first, or more, is reported as changing
     changing: float = 0.8
     # lines of a spectrum
+    lobe: int = 3  # bins on each side of a line that its window widens it to
     # bins on each side at least and at most, half of the frequency, from which the noise is known
     neighbours: tuple[int, int] = (8, 24)
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean

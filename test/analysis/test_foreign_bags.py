@@ -695,6 +695,15 @@ def test_corners_of_a_cycle_are_not_cut_off(shape: str, jitter: float, tmp_path:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("tau", [3.0, 6.0, 10.0])
+def test_a_slow_ring_down_is_no_limit_cycle_in_any_of_its_parts(tau: float, tmp_path: Path) -> None:
+    time = times(20.0)
+    ring = np.where(time > 1.5, np.exp(-(time - 1.5) / tau) * np.sin(2.0 * np.pi * 5.3 * (time - 1.5)), 0.0)
+    sentences = section(of_positions(tmp_path / "bag", time, 0.02 * ring + at_rest(time, ["j"], 94)[:, 0]), "stability")
+    assert sentences == ("Nothing in this recording was found to repeat five times without a gap.",)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["triangle", "waves", "velocity"])
 def test_a_cycle_beside_a_commanded_motion_of_any_shape_is_found(way: str, tmp_path: Path) -> None:
     time = times(30.0)

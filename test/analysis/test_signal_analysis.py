@@ -347,7 +347,7 @@ def test_a_swept_frequency_is_no_cycle(rate):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("decay", "frequency", "count"), [
-    (1.5, 6.0, 0), (5.0, 6.0, 0), (3.0, 5.3, 0), (6.0, 5.3, 0), (10.0, 5.3, 0), (-5.0, 6.0, 1), (-10.0, 2.0, 1),
+    (1.5, 6.0, 0), (5.0, 6.0, 0), (-5.0, 6.0, 1), (-10.0, 2.0, 1),
 ])  # fmt: skip
 def test_what_decays_in_a_part_of_a_recording_is_no_cycle_and_what_grows_is_said_to(decay, frequency, count):
     time = np.arange(10000) / 250.0

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, counted, shown
+from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.force import fate_words
-from wam_analysis.findings.force_steps import UNSTABLE, force_steps
+from wam_analysis.findings.force_steps import UNSTABLE, force_steps, many_steps
 from wam_analysis.findings.repetition import LEAST
 from wam_analysis.foreign.sources import AXES, Source
 from wam_analysis.held_messages import value_changes
@@ -37,7 +37,7 @@ def following_section(recording: AnalysedRecording) -> Section | None:
             if steps:
                 worst = max(steps, key=lambda step: step.error)
                 off = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
-                remarks.append(f"{counted(len(steps), 'step')}; the largest steady error is {off}")
+                remarks.append(f"{many_steps(steps, 'step')}; the largest steady error is {off}")
                 numbers["largest steady error"] = (worst.error, unit)
                 known = [step.response for step in steps if math.isfinite(step.response.rise)]
                 if known and found is None:  # a path has a rise of its own

@@ -1,6 +1,7 @@
 """Section about the steps of a commanded force or torque, and the response of the measured one."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -100,6 +101,12 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     return found
 
 
+def many_steps(steps: Sequence[ForceStep], what: str) -> str:
+    """How many steps there are, in words; what was commanded from the beginning is none."""
+    number = sum(not math.isnan(step.before) for step in steps)
+    return counted(number, what) if number else "commanded from the beginning"
+
+
 def step_section(recording: AnalysedRecording) -> Section | None:
     """Steps of a commanded force or torque, and how the measured one followed; None where no force was recorded."""
     forces, commands = [one for one in recording.states if not one.is_joint], recording.commands
@@ -145,7 +152,7 @@ def step_section(recording: AnalysedRecording) -> Section | None:
         if steps:
             worst = max(steps, key=lambda step: step.error)
             error = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
-            shows.append(f"{counted(len(steps), f'{quantity} step')}; the largest steady error is {error}.")
+            shows.append(f"{many_steps(steps, f'{quantity} step')}; the largest steady error is {error}.")
     if not shows and not doubts:
         hint = "; name the topic of its command with --command" * (not followed)
         sentences.append(f"No step of a commanded force was recorded{hint}.")

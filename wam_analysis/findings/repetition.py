@@ -99,7 +99,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
     span = f"To find vibrations below {least}, record longer without a gap."
-    silent = f"No vibration was found above {least} that lasts throughout."
+    silent = f"No clear vibration was found above {least} that lasts throughout."
     return Section("frequency", "Spectrum", (span if findings else silent,), findings)
 
 

@@ -44,7 +44,9 @@ def stick_section(recording: AnalysedRecording) -> Section:
             if found.slowest:
                 sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
         if found.commanded > SHAFT.disobeyed and 100.0 * found.stuck > SHAFT.turning:
-            sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
+            sentence += (
+                f"; it sticks or has play: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
+            )
             verdict.append(f"{one.label}: {sentence}.")
         alike[sentence].append(one.label)
     sentences = [f"{', '.join(labels)}: {sentence}." for sentence, labels in alike.items()]

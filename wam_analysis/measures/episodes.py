@@ -20,13 +20,7 @@ class Episode(NamedTuple):
 
 
 def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
-    """Limit cycles in windows of the whole, of half, of a quarter ... of a signal, in the order of time.
-
-    The whole is without rests at both ends.
-    Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
-    window or beyond it, and is evaluated between these ends.  A motion that decays between them is none, one that grows
-    is one.  There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow
-    motion: one that ends within a period, or has half of its period, is part of its shape.
+    """Limit cycles of a signal, in the order of time: in windows, and of all of it but for rests at its ends.
 
     Parameters
     ----------
@@ -34,10 +28,27 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     value : (n,), without NaN.
     least : peak to peak of the smallest cycle that is reported, above the noise.
     """
-    from_start, to_end = (np.flatnonzero(np.abs(value - value[end]) > least) for end in (0, -1))
-    if len(from_start) and len(to_end) and from_start[0] < to_end[-1]:
-        moving = slice(max(from_start[0] - 1, 0), to_end[-1] + 2)
-        time, value = time[moving], value[moving]
+    found = _in_windows(time, value, least)
+    left, enters = (np.flatnonzero(np.abs(value - value[end]) > least) for end in (0, -1))
+    if not len(left) or not len(enters) or left[0] >= enters[-1]:
+        return found
+    moving = slice(max(left[0] - 1, 0), enters[-1] + 2)
+    cycle = _cycle(time[moving], value[moving], least)
+    # one of at most twice its frequency is the same, or a part of its shape
+    faster = [one for one in found if cycle and (2.0 + CYCLE.same_period) * one.cycle.period < cycle.period]
+    if cycle is None or any(one.cycle.period > (1.0 - CYCLE.same_period) * cycle.period for one in found):
+        return found
+    return [Episode(float(time[moving][0]), float(time[moving][-1]), cycle), *faster]
+
+
+def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
+    """Limit cycles in windows of the whole, of half, of a quarter ... of a signal.
+
+    Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
+    window or beyond it, and is evaluated between these ends.  A motion that decays between them is none, one that grows
+    is one.  There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow
+    motion: one that ends within a period, or has half of its period, is part of its shape.
+    """
     n = length = len(value)
     longest = np.full(n, n)  # window that is looked at
     found: list[Episode] = []

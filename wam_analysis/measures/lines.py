@@ -7,7 +7,7 @@ import numpy as np
 
 from wam_analysis.measures.limit_cycle import top
 from wam_analysis.thresholds import CYCLE
-from wam_bag.arrays import Numbers
+from wam_bag.arrays import Mask, Numbers
 
 
 class SpectralLine(NamedTuple):
@@ -41,11 +41,13 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[Spect
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     sure = math.log(n / 2) + CYCLE.sure_line
     found: list[SpectralLine] = []
+    free = np.ones(len(power), np.bool_)  # of stronger lines, whose power is no noise
     for k in peaks[np.argsort(-power[peaks])].tolist():
+        if power[k] < sure * max(_nearest(levels, free, k), _noise(levels, free, k)):
+            continue
+        free[max(k - CYCLE.lobe, 0) : k + CYCLE.lobe + 1] = False
         is_clear = not found or (len(found) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
         if k < CYCLE.episode_cycles or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
-            continue
-        if power[k] < sure * max(_nearest(power, k), _noise(levels, k)):
             continue
         frequency = top(levels, k) * spacing
         back = np.exp(-2j * np.pi * frequency * even)
@@ -63,15 +65,19 @@ def _windowed(value: Numbers) -> tuple[Numbers, Numbers]:
     return flat * window, window
 
 
-def _nearest(power: Numbers, k: int) -> float:
-    """Mean of the nearest bins: the level of the noise where it is higher than `_noise`, as next to a transient."""
-    return float(np.mean(np.concatenate((power[max(k - 4, 1) : k - 2], power[k + 3 : k + 5]))))
+def _nearest(levels: Numbers, free: Mask, k: int) -> float:
+    """Power of the nearest bins: the level of the noise where it is higher than `_noise`, as next to a transient."""
+    rows = np.r_[max(k - 4, 1) : k - 2, k + 3 : min(k + 5, len(levels))]
+    return math.exp(2.0 * float(np.mean(levels[rows][free[rows]])) + CYCLE.euler_gamma) if np.any(free[rows]) else 0.0
 
 
-def _noise(levels: Numbers, k: int) -> float:
+def _noise(levels: Numbers, free: Mask, k: int) -> float:
     """Power of the noise at a bin: of a line through the logarithms of amplitude and frequency of its neighbours."""
     least, most = CYCLE.neighbours
     reach = min(max(k // 2, least), most)
     rows = np.r_[max(k - reach, 1) : k - 2, k + 3 : min(k + reach + 1, len(levels))]
+    rows = rows[free[rows]]
+    if len(rows) < 2:
+        return math.inf
     line = np.polynomial.polynomial.polyfit(np.log(rows / k), 2.0 * levels[rows], 1)
     return math.exp(float(line[0]) + CYCLE.euler_gamma)
