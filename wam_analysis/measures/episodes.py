@@ -33,10 +33,11 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     if not len(left) or not len(enters) or left[0] >= enters[-1]:
         return found
     moving = slice(max(left[0] - 1, 0), enters[-1] + 2)
-    cycle = _cycle(time[moving], value[moving], least)
+    cycle, rested = _cycle(time[moving], value[moving], least), time[-1] - time[moving][-1] + time[moving][0] - time[0]
     # one of at most twice its frequency is the same, or a part of its shape
     faster = [one for one in found if cycle and (2.0 + CYCLE.same_period) * one.cycle.period < cycle.period]
-    if cycle is None or any(one.cycle.period > (1.0 - CYCLE.same_period) * cycle.period for one in found):
+    is_known = cycle and any(one.cycle.period > (1.0 - CYCLE.same_period) * cycle.period for one in found)
+    if cycle is None or is_known or rested < CYCLE.same_period * cycle.period:
         return found
     return [Episode(float(time[moving][0]), float(time[moving][-1]), cycle), *faster]
 

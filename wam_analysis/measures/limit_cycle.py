@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.measures.runs import after_gaps, noise
-from wam_analysis.thresholds import CYCLE, SHAFT
+from wam_analysis.thresholds import CYCLE
 from wam_bag.arrays import Numbers
 
 
@@ -71,9 +71,9 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
     folded = _fold(flat, phase, phases)
     if math.isnan(period) and n >= 2 * CYCLE.cycles * lag:
-        cells = max(min(phases, int(lag)) // 2, 2)  # each has a sample of every cycle
+        cells = max(min(phases, int(lag) // 2), 2)  # each has a sample of every cycle
         once, twice = (_fold(flat, np.arange(n) / (k * lag) % 1.0, k * cells).explained for k in (1, 2))
-        if 1.0 - twice < SHAFT.much_better * (1.0 - once):  # every other cycle is alike
+        if 1.0 - twice < (1.0 - CYCLE.sure) * (1.0 - once):  # every other cycle is alike
             return limit_cycle(time, value, 2.0 * lag * seconds)
     half = n // 2
     first, second = (_fold(flat[rows], phase[rows], phases).size for rows in (slice(half), slice(half, n)))
