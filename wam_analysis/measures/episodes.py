@@ -39,7 +39,8 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     is_known = cycle and any(one.cycle.period > (1.0 - CYCLE.same_period) * cycle.period for one in found)
     if cycle is None or is_known or rested < CYCLE.same_period * cycle.period:
         return found
-    return [Episode(float(time[moving][0]), float(time[moving][-1]), cycle), *faster]
+    whole = Episode(float(time[moving][0]), float(time[moving][-1]), cycle)
+    return sorted([whole, *faster], key=lambda episode: episode.begin)
 
 
 def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:

@@ -43,11 +43,14 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[Spect
     found: list[SpectralLine] = []
     free = np.ones(len(power), np.bool_)  # of stronger lines, whose power is no noise
     for k in peaks[np.argsort(-power[peaks])].tolist():
+        is_clear = not found or (len(found) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
+        is_drift = k < CYCLE.episode_cycles
+        if not (is_drift or is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
+            continue
         if power[k] < sure * max(_nearest(levels, free, k), _noise(levels, free, k)):
             continue
         free[max(k - CYCLE.lobe, 0) : k + CYCLE.lobe + 1] = False
-        is_clear = not found or (len(found) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
-        if k < CYCLE.episode_cycles or not (is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
+        if is_drift:
             continue
         frequency = top(levels, k) * spacing
         back = np.exp(-2j * np.pi * frequency * even)
