@@ -12,6 +12,7 @@ from wam_description.arm import Arm
 from wam_description.thresholds import MODEL
 
 Array = NDArray[np.float64]
+INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of the last six parameters of a link
 FLOAT = np.dtype(float)
 
 
@@ -173,6 +174,12 @@ class RigidBody:
     def _pose(self, q: ArrayLike, frame: int) -> Pose:
         placement = self._placement(q, frame)
         return Pose(placement.rotation.copy(), placement.translation.copy())
+
+
+def point_mass(at: ArrayLike) -> Array:
+    """The ten inertial parameters of 1 kg at a point of a link's frame, m, about its origin."""
+    place = _vector(at)
+    return np.concatenate(([1.0], place, (place @ place * np.eye(3) - np.outer(place, place))[INERTIA]))
 
 
 def joint_placement(arm: Arm, i: int) -> pin.SE3:

@@ -14,7 +14,6 @@ import numpy as np
 from wam_analysis.identification.fit import Identification, rms
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.regressor import Regressor
-from wam_analysis.identification.unknowns import Unknowns
 from wam_analysis.thresholds import IDENTIFY, SHAFT
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
@@ -85,7 +84,8 @@ def _symptoms(shared: Shared, motion: MotionSamples, found: Identification) -> I
 def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Contradiction | None:
     """The one mistake that explains the recorded torques much better than none; None where none does."""
     motors, unknowns = shared.arm.motors.names, found.unknowns
-    model, torque, used = _torques(shared, unknowns, motion)
+    regressor = Regressor(shared, unknowns, motion, IDENTIFY.least_motion)
+    model, torque, used = _torques(regressor, motion)
     as_recorded = _misfit(model, torque, used)
     scale = _ratio(model, torque, used)
     tried = [(_misfit(scale * model, torque, used), Contradiction(Mistake.SCALED, (), scale))]
@@ -96,7 +96,7 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
         tried.append((_misfit(one * model, torque, used), mistake))
     # a factor that a torque constant or a mass may be wrong by is no mistake
     tried = [one for one in tried if not 1.0 / IDENTIFY.heavier < one[1].size < IDENTIFY.heavier]
-    of_payload = Regressor(shared, unknowns, motion).payload_torque
+    of_payload = regressor.payload_torque
     payload = shared.arm.payload + (more := _ratio(of_payload, torque - model, used))
     if payload > 0.0:
         there = Contradiction(Mistake.PAYLOAD, (), payload)
@@ -106,16 +106,18 @@ def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Cont
         change[[i, j]] = change[[j, i]] if i < j else -change[[i, i]]
         changed = motion._replace(**{name: one @ change for name, one in motion._asdict().items() if one.ndim > 1})
         mistake = Contradiction(Mistake.SWAPPED if i < j else Mistake.TURNED, tuple({motors[i]: 1, motors[j]: 1}), 1.0)
-        tried.append((_misfit(*_torques(shared, unknowns, changed)), mistake))
+        regressor = Regressor(shared, unknowns, changed, IDENTIFY.least_motion)
+        tried.append((_misfit(*_torques(regressor, changed)), mistake))
     least, cause = min(tried, key=lambda one: one[0])
     is_clear = as_recorded > IDENTIFY.misfit and least < SHAFT.much_better * as_recorded
     return cause if is_clear else None
 
 
-def _torques(shared: Shared, unknowns: Unknowns, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
+def _torques(regressor: Regressor, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
     """Torques of the configured arm and the recorded ones, N m, and where they count, (k, n) each."""
-    equations = Regressor(shared, unknowns, motion, IDENTIFY.least_motion).equations(unknowns.present)
-    return equations.columns @ unknowns.present + motion.torque - equations.torque, motion.torque, equations.is_used
+    present = regressor.unknowns.present
+    equations = regressor.equations(present)
+    return equations.columns @ present + motion.torque - equations.torque, motion.torque, equations.is_used
 
 
 def _misfit(model: Numbers, torque: Numbers, used: Mask) -> float:

@@ -13,11 +13,10 @@ from wam_analysis.identification.unknowns import AXES, DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import INERTIA, RigidBody, point_mass
 from wam_description.transmission_map import TransmissionMap
 
 STEP = 1e-6  # kg, kg m, kg m^2, of a link, by which the slopes of its parameters are found
-INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of the last six parameters of a link
 
 
 class Equations(NamedTuple):
@@ -63,8 +62,7 @@ class Regressor:
         body = RigidBody(shared.arm)
         links = np.array([body.inverse_dynamics_regressor(*state) for state in zip(q, qd, qdd, strict=True)])
         self._links = np.einsum("ji,kjp->kip", self._matrix, links)
-        point = np.array(shared.arm.tool)
-        self._at_tool = about_origin(np.array([1.0, *point, 0.0, 0.0, 0.0]), (0.0, 0.0, 0.0))  # of 1 kg there
+        self._at_tool = point_mass(shared.arm.tool)
         rest = np.zeros(qd.shape[1])
         self._weights = np.array([body.inverse_dynamics_regressor(each, rest, rest) for each in q])
         self._carried = (qdd * shared.model.joints.armature) @ self._matrix

@@ -12,10 +12,9 @@ from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import DISTANCE_VARIANCE, DISTANCE_WEIGHTS, EQUAL, LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import RigidBody, point_mass
 
 Array = NDArray[np.float64]
-INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of an inertia
 
 
 class FilteredMotion(NamedTuple):
@@ -47,10 +46,9 @@ class LinkEffects:
 
     def __init__(self, arm: Arm, body: RigidBody, masses: Array) -> None:
         n = len(masses)
-        self.body, tool = body, np.array(arm.tool)
-        inertia = tool @ tool * np.eye(3) - np.outer(tool, tool)
+        self.body = body
         centres = np.kron(np.diag(-masses), np.eye(10, 3, -1))
-        load = np.concatenate((np.zeros(10 * n - 10), [-1.0], -tool, -inertia[INERTIA]))
+        load = np.concatenate((np.zeros(10 * n - 10), -point_mass(arm.tool)))
         self._per_error = np.column_stack((centres, load))
 
     def of(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
