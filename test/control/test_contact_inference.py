@@ -205,16 +205,13 @@ def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("cover", "x", "force"),
-    [
-        ("outer_link", 0.0, (0, 6, 0)),
-        ("outer_link", 0.02, (0, 0, 6)),
-        ("outer_link", 0.02, (0, 4, 4)),
-        ("inner_link", 0.3, (0, 0, 6)),
-        ("inner_link", 0.5, (0, 4.2, 4.2)),
-    ],
-)
+@pytest.mark.parametrize(("cover", "x", "force"), [
+    ("outer_link", 0.0, (0, 6, 0)),
+    ("outer_link", 0.02, (0, 0, 6)),
+    ("outer_link", 0.02, (0, 4, 4)),
+    ("inner_link", 0.3, (0, 0, 6)),
+    ("inner_link", 0.5, (0, 4.2, 4.2)),
+])  # fmt: skip
 def test_odds_of_the_links_are_those_of_brute_force(cover: str, x: float, force: tuple[float, float, float]) -> None:
     tau = torques(POSE, cover, (x, 0, 0.04064 / L3 * x if cover == "inner_link" else 0), force)
     found = ContactInference(WAM, RigidBody(WAM), UNIFORM).infer(POSE, tau.tolist(), np.linalg.inv(COARSE))

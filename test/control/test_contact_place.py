@@ -57,21 +57,18 @@ def test_a_pinned_place_is_not_overridden_and_known_as_well_as_declared(contact:
     assert found == ForcePlace(OUTER, 0.28, OWN.contact_position_sd, is_pinned=True, is_known=True)
 
 
-@pytest.mark.parametrize(
-    ("axis", "contact", "lean", "where", "is_known"),
-    [
-        (force(), NO_CONTACT, 0.0, (OUTER, 0.28, ANYWHERE), False),
-        (force(INNER), NO_CONTACT, 0.0, (INNER, COVERS.length_of(INNER) / 2, ...), False),
-        (force(), SURE, 0.0, (OUTER, 0.1, 0.001), True),
-        (force(), SURE._replace(position_sd=math.nan), 0.0, (OUTER, 0.1, 0.0), True),
-        (force(), SURE._replace(cover=INNER), 0.0, (INNER, 0.1, 0.001), True),
-        (force(), SURE._replace(position=math.nan), 0.0, (OUTER, 0.28, ANYWHERE), False),
-        (force(), SURE._replace(probability=0.5), 0.0, (OUTER, 0.28, ANYWHERE), False),
-        (force(OUTER), SURE._replace(cover=INNER), 0.0, (OUTER, 0.28, ANYWHERE), False),
-        (force(), SURE, 0.42, (OUTER, 0.1, 0.001), True),
-        (force(), SURE, 0.57, (OUTER, 0.28, ANYWHERE), False),
-    ],
-)
+@pytest.mark.parametrize(("axis", "contact", "lean", "where", "is_known"), [
+    (force(), NO_CONTACT, 0.0, (OUTER, 0.28, ANYWHERE), False),
+    (force(INNER), NO_CONTACT, 0.0, (INNER, COVERS.length_of(INNER) / 2, ...), False),
+    (force(), SURE, 0.0, (OUTER, 0.1, 0.001), True),
+    (force(), SURE._replace(position_sd=math.nan), 0.0, (OUTER, 0.1, 0.0), True),
+    (force(), SURE._replace(cover=INNER), 0.0, (INNER, 0.1, 0.001), True),
+    (force(), SURE._replace(position=math.nan), 0.0, (OUTER, 0.28, ANYWHERE), False),
+    (force(), SURE._replace(probability=0.5), 0.0, (OUTER, 0.28, ANYWHERE), False),
+    (force(OUTER), SURE._replace(cover=INNER), 0.0, (OUTER, 0.28, ANYWHERE), False),
+    (force(), SURE, 0.42, (OUTER, 0.1, 0.001), True),
+    (force(), SURE, 0.57, (OUTER, 0.28, ANYWHERE), False),
+])  # fmt: skip
 def test_an_estimated_place_is_used_where_it_is_good_enough(
     axis: TaskAxis, contact: Contact, lean: float, where: tuple[str, float, float], is_known: bool
 ) -> None:
@@ -88,10 +85,9 @@ def test_the_last_certain_place_is_kept_while_something_is_touched_and_no_longer
     assert found == [0.1, 0.1, OWN.contact_position]
 
 
-@pytest.mark.parametrize(
-    ("position", "way", "expected"),
-    [(0.2, 0.01, 0.19), (0.2, -0.01, 0.21), (0.2, 9.0, 0.0), (0.2, -9.0, LENGTH), (LENGTH, 0.01, LENGTH)],
-)
+@pytest.mark.parametrize(("position", "way", "expected"), [
+    (0.2, 0.01, 0.19), (0.2, -0.01, 0.21), (0.2, 9.0, 0.0), (0.2, -9.0, LENGTH), (LENGTH, 0.01, LENGTH),
+])  # fmt: skip
 def test_the_link_slides_along_what_it_touches_but_its_end_takes_it_along(
     position: float, way: float, expected: float
 ) -> None:

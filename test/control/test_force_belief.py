@@ -39,21 +39,18 @@ def errors(q: Sequence[float], force: float, sd: float = 0.01, **more: float) ->
     return predicted(axis_at(q, force, sd), SD, PLAIN, **more)
 
 
-@pytest.mark.parametrize(
-    ("part", "limits", "given"),
-    [
-        ("torques", {}, {"torque_sd": 1.0}),
-        ("place", {}, {"sd": 0.1}),
-        ("resting", {}, {"resting": -9.0}),
-        ("moving_surface", {"surface_speed": 0.015}, {}),
-        ("moving_surface", {"surface_speed": 9.0}, {}),  # no force law follows it
-        ("moving_surface", {"slide_speed": 1.0}, {}),
-        ("slow_arm", {"impact": 1e-6}, {}),
-        ("slow_arm", {"settling_time": 1e-3}, {}),
-        ("shaking_arm", {}, {"shaking": 100.0}),
-        ("friction", {}, {"torque_sd": 1e-5, "sd": 0.0}),
-    ],
-)
+@pytest.mark.parametrize(("part", "limits", "given"), [
+    ("torques", {}, {"torque_sd": 1.0}),
+    ("place", {}, {"sd": 0.1}),
+    ("resting", {}, {"resting": -9.0}),
+    ("moving_surface", {"surface_speed": 0.015}, {}),
+    ("moving_surface", {"surface_speed": 9.0}, {}),  # no force law follows it
+    ("moving_surface", {"slide_speed": 1.0}, {}),
+    ("slow_arm", {"impact": 1e-6}, {}),
+    ("slow_arm", {"settling_time": 1e-3}, {}),
+    ("shaking_arm", {}, {"shaking": 100.0}),
+    ("friction", {}, {"torque_sd": 1e-5, "sd": 0.0}),
+])  # fmt: skip
 def test_each_cause_counts_by_itself_and_is_named_where_it_is_the_largest(
     part: str, limits: dict[str, float], given: dict[str, Any]
 ) -> None:

@@ -35,26 +35,23 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
     assert parse("", Level.WARN, "text", found) == status
 
 
-@pytest.mark.parametrize(
-    ("event", "words"),
-    [
-        (OBEYED, ""),
-        (Event(Code.DONE), "done"),
-        (refused("task_command", "no effect"), "no effect"),
-        (Event(Code.FAULT, Level.ERROR, {"reason": "the cable slipped"}), "the cable slipped"),
-        (warning(Code.PUSHED, "pushed", force=24.6, **PUSH), "at least 25 N acts on the arm; allowed: 20 N"),
-        (warning(Code.PUSHED, "pushed", force=20.04, **PUSH), "at least 20.04 N acts on the arm; allowed: 20 N"),
-        (fault("command_stale", age_ms=45.04, allowed_ms=45.0, cure=""), "45.04 ms old; allowed: below 45 ms"),
-        (fault("bus_safety_idle", detail="velocity"), "the arm moved faster than the safety module allows"),
-        (warning(Code.NOT_REACHED, "force_off", measured=-0.2, **OFF), "for 2 s; hardly anything is touched"),
-        (warning(Code.NOT_REACHED, "force_off", measured=-5.6, **OFF), "for 2 s; the arm is pulled"),
-        (warning(Code.NOT_REACHED, "force_off", measured=-2.6, **OFF | {"desired": -5.0}), "for 2 s; hardly anything"),
-        (warning(Code.MODEL_OFF, "model_off", part="friction of motor1"), "if it lasts, run 'wam identify'"),
-        (warning(Code.MODEL_OFF, "model_off", part="payload"), "(arm.payload); if the tool carries none, run"),
-        (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="motors"), "position, use the dither (t"),
-        (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="sensors"), "position, or free the arm"),
-    ],
-)
+@pytest.mark.parametrize(("event", "words"), [
+    (OBEYED, ""),
+    (Event(Code.DONE), "done"),
+    (refused("task_command", "no effect"), "no effect"),
+    (Event(Code.FAULT, Level.ERROR, {"reason": "the cable slipped"}), "the cable slipped"),
+    (warning(Code.PUSHED, "pushed", force=24.6, **PUSH), "at least 25 N acts on the arm; allowed: 20 N"),
+    (warning(Code.PUSHED, "pushed", force=20.04, **PUSH), "at least 20.04 N acts on the arm; allowed: 20 N"),
+    (fault("command_stale", age_ms=45.04, allowed_ms=45.0, cure=""), "45.04 ms old; allowed: below 45 ms"),
+    (fault("bus_safety_idle", detail="velocity"), "the arm moved faster than the safety module allows"),
+    (warning(Code.NOT_REACHED, "force_off", measured=-0.2, **OFF), "for 2 s; hardly anything is touched"),
+    (warning(Code.NOT_REACHED, "force_off", measured=-5.6, **OFF), "for 2 s; the arm is pulled"),
+    (warning(Code.NOT_REACHED, "force_off", measured=-2.6, **OFF | {"desired": -5.0}), "for 2 s; hardly anything"),
+    (warning(Code.MODEL_OFF, "model_off", part="friction of motor1"), "if it lasts, run 'wam identify'"),
+    (warning(Code.MODEL_OFF, "model_off", part="payload"), "(arm.payload); if the tool carries none, run"),
+    (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="motors"), "position, use the dither (t"),
+    (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="sensors"), "position, or free the arm"),
+])  # fmt: skip
 def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: str) -> None:
     assert words in sentence(event)
     assert words or not sentence(event)
@@ -67,14 +64,11 @@ def test_each_of_several_events_is_a_line_at_a_terminal_once() -> None:
     assert news(status, {late.subject}) == "a: at limit: far"
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"event.1": "of another version", "event.1.severity": "WARN"},
-        {"event.1": "fault", "event.1.severity": "loud", "event.1.force": "{"},
-        {"event.1": "fault"},
-    ],
-)
+@pytest.mark.parametrize("given", [
+    {"event.1": "of another version", "event.1.severity": "WARN"},
+    {"event.1": "fault", "event.1.severity": "loud", "event.1.force": "{"},
+    {"event.1": "fault"},
+])  # fmt: skip
 def test_an_event_that_is_not_understood_is_left_out(given: dict[str, str]) -> None:
     assert parse("driver", 1, "", given.items()).events == ()
 

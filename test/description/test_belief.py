@@ -180,17 +180,14 @@ def test_a_new_driver_takes_a_number_that_no_node_follows() -> None:
     assert session.silent == []
 
 
-@pytest.mark.parametrize(
-    ("ages", "silent"),
-    [
-        ({"motor_effort_command": 1.02, "motor_velocity_command": 0.05}, ["gravity"]),
-        ({"motor_effort_command": 1.02, "motor_velocity_command": 0.65}, ["gravity"]),  # transform is late, too
-        ({"motor_effort_command": 0.05, "motor_velocity_command": 1.02}, ["force_loop"]),
-        ({"motor_effort_command": 1.02, "motor_velocity_command": 0.8}, ["transform"]),
-        ({"motor_effort_command": 2.5, "motor_velocity_command": 1.2}, ["gravity"]),
-        ({"external_joint_torques": 1.0, "contact/hypotheses": 1.1}, ["contact_estimator"]),
-    ],
-)
+@pytest.mark.parametrize(("ages", "silent"), [
+    ({"motor_effort_command": 1.02, "motor_velocity_command": 0.05}, ["gravity"]),
+    ({"motor_effort_command": 1.02, "motor_velocity_command": 0.65}, ["gravity"]),  # transform is late, too
+    ({"motor_effort_command": 0.05, "motor_velocity_command": 1.02}, ["force_loop"]),
+    ({"motor_effort_command": 1.02, "motor_velocity_command": 0.8}, ["transform"]),
+    ({"motor_effort_command": 2.5, "motor_velocity_command": 1.2}, ["gravity"]),
+    ({"external_joint_torques": 1.0, "contact/hypotheses": 1.1}, ["contact_estimator"]),
+])  # fmt: skip
 def test_the_node_that_has_stopped_is_named(ages: dict[str, float], silent: list[str]) -> None:
     lost, nodes, others = Interface(WAM.shared).silent(ages)
     assert (nodes, others) == (silent, ["force_loop", "gravity"] * (silent == ["transform"]))
@@ -291,14 +288,11 @@ def enabled() -> Simulation:
     return run
 
 
-@pytest.mark.parametrize(
-    ("topic", "value"),
-    [
-        ("joint_velocity_command", State([], [0.5, 0.0, 0.0, 0.0], [])),
-        ("motor_velocity_command", State([], [15.0, 0.0, 0.0, 0.0], [])),
-        ("force_command", Wrench("outer_link", (0.0, -10.0, 0.0), ZERO)),
-    ],
-)
+@pytest.mark.parametrize(("topic", "value"), [
+    ("joint_velocity_command", State([], [0.5, 0.0, 0.0, 0.0], [])),
+    ("motor_velocity_command", State([], [15.0, 0.0, 0.0, 0.0], [])),
+    ("force_command", Wrench("outer_link", (0.0, -10.0, 0.0), ZERO)),
+])  # fmt: skip
 def test_a_message_with_a_stamp_of_the_wall_clock_is_refused_and_moves_nothing(
     topic: str, value: Any, enabled: Simulation
 ) -> None:

@@ -115,22 +115,19 @@ def test_covers_meet_obstacles_and_nothing_else() -> None:
     assert folded.ncon == 0
 
 
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"shapes": ("ball",)}, "shapes"),
-        ({"shapes": ()}, "shapes"),
-        ({"positions": (0.0, 0.0)}, "positions"),
-        ({"rotations": (0.0,) * 6}, "rotations"),
-        ({"sizes": (0.1, 0.0, 0.1)}, "block: world.obstacles.sizes"),
-        ({"sizes": (0.1, -0.2, 0.1)}, "sizes"),
-        ({"stiffness": (0.0,)}, "stiffness"),
-        ({"damping": (-1.0,)}, "damping"),
-        ({"friction": (float("nan"),)}, "friction"),
-        ({"names": ("block", "post")}, "obstacles.stiffness"),
-        ({"names": ("",)}, "obstacles.names' is ''; give each a name of its own"),
-    ],
-)
+@pytest.mark.parametrize(("change", "named"), [
+    ({"shapes": ("ball",)}, "shapes"),
+    ({"shapes": ()}, "shapes"),
+    ({"positions": (0.0, 0.0)}, "positions"),
+    ({"rotations": (0.0,) * 6}, "rotations"),
+    ({"sizes": (0.1, 0.0, 0.1)}, "block: world.obstacles.sizes"),
+    ({"sizes": (0.1, -0.2, 0.1)}, "sizes"),
+    ({"stiffness": (0.0,)}, "stiffness"),
+    ({"damping": (-1.0,)}, "damping"),
+    ({"friction": (float("nan"),)}, "friction"),
+    ({"names": ("block", "post")}, "obstacles.stiffness"),
+    ({"names": ("",)}, "obstacles.names' is ''; give each a name of its own"),
+])  # fmt: skip
 def test_bad_obstacle_is_refused_with_the_name_of_the_parameter(change: dict[str, object], named: str) -> None:
     assert build(Obstacles, values(FOAM)) == FOAM
     with pytest.raises(ParameterError, match=named):

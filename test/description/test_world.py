@@ -186,18 +186,15 @@ def test_the_inertia_is_that_of_a_uniform_body() -> None:
         assert principal_inertia(shape, given, 2.0) == pytest.approx(expected, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"bodies": {"sizes": (0.05, 0.0, 0.04)}}, "thing: world.bodies.sizes of a box begins with 0.05, 0, 0.04 m"),
-        ({"bodies": {"names": ("table",)}}, "obstacles, pushers, bodies and doors are named table"),
-        ({"doors": {"upper": (-0.1,)}}, "door: world.doors.lower is -3 rad, upper -0.1 rad; 0, the angle at power-up"),
-        ({"motions": {"obstacles": ("shelf",)}}, "motions.obstacles names 'shelf'; obstacles: table"),
-        ({"bodies": {"mass": (0.002,)}}, "'table' and body 'thing'; allowed: up to"),
-        ({"bodies": {"stiffness": (1e8,)}}, "body 'thing' on inner_link; allowed: up to"),
-        ({"doors": {"spring": (1e5,), "mass": (0.01,)}}, "too long for .*hinges; allowed: up to"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"bodies": {"sizes": (0.05, 0.0, 0.04)}}, "thing: world.bodies.sizes of a box begins with 0.05, 0, 0.04 m"),
+    ({"bodies": {"names": ("table",)}}, "obstacles, pushers, bodies and doors are named table"),
+    ({"doors": {"upper": (-0.1,)}}, "door: world.doors.lower is -3 rad, upper -0.1 rad; 0, the angle at power-up"),
+    ({"motions": {"obstacles": ("shelf",)}}, "motions.obstacles names 'shelf'; obstacles: table"),
+    ({"bodies": {"mass": (0.002,)}}, "'table' and body 'thing'; allowed: up to"),
+    ({"bodies": {"stiffness": (1e8,)}}, "body 'thing' on inner_link; allowed: up to"),
+    ({"doors": {"spring": (1e5,), "mass": (0.01,)}}, "too long for .*hinges; allowed: up to"),
+])  # fmt: skip
 def test_a_world_that_cannot_be_simulated_is_refused(change: dict[str, dict[str, Any]], message: str) -> None:
     given = {"bodies": body(), "doors": door(), "motions": motion((0.0, 0.0, 0.01), 0.5)}
     with pytest.raises(ParameterError, match=message):
@@ -276,23 +273,20 @@ def one_obstacle(shape: str, position: np.ndarray, sizes: tuple[float, ...]) -> 
     )
 
 
-@pytest.mark.parametrize(
-    ("world", "text"),
-    [
-        (World(one_obstacle("cylinder", on_the_axis(), (0.05, 0.5, 0.0)), NO_SPRINGS), "obstacle 'post' is "),
-        (World(one_obstacle("box", on_the_axis(), (2.0, 2.0, 2.0)), NO_SPRINGS), "obstacle 'post' is "),
-        (World(TABLE, NO_SPRINGS, bodies=body("ball", positions=tuple(on_the_axis().tolist()))), "body 'thing' is "),
-        (World(TABLE, NO_SPRINGS, doors=door(positions=tuple(on_the_axis().tolist()))), "door 'door' is "),
-        (
-            World(
-                one_obstacle("box", on_the_axis(), (0.1, 0.1, 0.1)),
-                NO_SPRINGS,
-                motions=Motions(("post",), (0.3, 0.0, 0.0), (0.5,), (1.0,)),
-            ),
-            "obstacle 'post' is ",
+@pytest.mark.parametrize(("world", "text"), [
+    (World(one_obstacle("cylinder", on_the_axis(), (0.05, 0.5, 0.0)), NO_SPRINGS), "obstacle 'post' is "),
+    (World(one_obstacle("box", on_the_axis(), (2.0, 2.0, 2.0)), NO_SPRINGS), "obstacle 'post' is "),
+    (World(TABLE, NO_SPRINGS, bodies=body("ball", positions=tuple(on_the_axis().tolist()))), "body 'thing' is "),
+    (World(TABLE, NO_SPRINGS, doors=door(positions=tuple(on_the_axis().tolist()))), "door 'door' is "),
+    (
+        World(
+            one_obstacle("box", on_the_axis(), (0.1, 0.1, 0.1)),
+            NO_SPRINGS,
+            motions=Motions(("post",), (0.3, 0.0, 0.0), (0.5,), (1.0,)),
         ),
-    ],
-)
+        "obstacle 'post' is ",
+    ),
+])  # fmt: skip
 def test_what_is_inside_a_link_at_power_up_is_refused_with_link_and_depth(world: World, text: str) -> None:
     with pytest.raises(ParameterError) as refusal:
         Plant(WAM, world, no_effects(WAM), STEP)

@@ -61,19 +61,16 @@ def test_a_bag_without_a_node_is_refused_with_the_nodes_that_it_has() -> None:
         read({"gravity": NODES["gravity"]}).node("driver")
 
 
-@pytest.mark.parametrize(
-    ("missing", "unknown", "text"),
-    [
-        (("arm.gravity",), {}, "misses the parameters arm.gravity"),
-        ((), {"arm.colour": "red"}, "has the unknown parameters arm.colour"),
-        (
-            ("watchdog",),
-            {"lamp": 1},
-            "misses the parameters driver:watchdog and has the unknown parameters driver:lamp",
-        ),
-        (("watchdog",), {"lamp": 1, "nodes": ["own:Driver"]}, ""),  # another class, with its own parameters
-    ],
-)
+@pytest.mark.parametrize(("missing", "unknown", "text"), [
+    (("arm.gravity",), {}, "misses the parameters arm.gravity"),
+    ((), {"arm.colour": "red"}, "has the unknown parameters arm.colour"),
+    (
+        ("watchdog",),
+        {"lamp": 1},
+        "misses the parameters driver:watchdog and has the unknown parameters driver:lamp",
+    ),
+    (("watchdog",), {"lamp": 1, "nodes": ["own:Driver"]}, ""),  # another class, with its own parameters
+])  # fmt: skip
 def test_missing_and_unknown_parameters_are_one_finding_that_names_each_once(
     missing: tuple[str, ...], unknown: dict[str, Any], text: str
 ) -> None:

@@ -171,15 +171,12 @@ def test_a_configuration_that_differs_from_the_recording_is_reported_with_the_va
     assert replay(bag, "contact_estimator").changed == ()
 
 
-@pytest.mark.parametrize(
-    ("node", "value", "topic"),
-    [
-        ("velocity_loop", {"servo.integral_gain": [2.5, 2.0, 2.0, 1.0]}, "motor_current_command"),
-        ("force_loop", {"force_loop:posture_gain": 4.5}, "joint_velocity_command"),
-        ("contact_estimator", {"contact_estimator:observer.time_constant": 0.03}, "external_joint_torques"),
-        ("gravity", {"arm.gravity": [0.0, 0.0, -9.81]}, "gravity_effort"),
-    ],
-)
+@pytest.mark.parametrize(("node", "value", "topic"), [
+    ("velocity_loop", {"servo.integral_gain": [2.5, 2.0, 2.0, 1.0]}, "motor_current_command"),
+    ("force_loop", {"force_loop:posture_gain": 4.5}, "joint_velocity_command"),
+    ("contact_estimator", {"contact_estimator:observer.time_constant": 0.03}, "external_joint_torques"),
+    ("gravity", {"arm.gravity": [0.0, 0.0, -9.81]}, "gravity_effort"),
+])  # fmt: skip
 def test_another_parameter_makes_a_difference_that_is_named(bag: Path, node: str, value: dict, topic: str) -> None:  # type: ignore[type-arg]
     configuration = Configuration.load(packaged("wam")).with_values(value)
     done = replay(bag, node, configuration)

@@ -65,15 +65,12 @@ def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("frame", "newtons", "seconds", "error"),
-    [
-        ("link", [0.0, -20.0, 0.0], 1.2, -11.8),
-        ("base", [0.0, 0.0, -20.0], 1.2, -11.8),
-        ("link", [0.0, 20.0, 0.0], 1.0, -100.0),  # nothing is touched; not too brief
-        ("link", [0.0, -20.0, 0.0], 0.4, float("nan")),  # too brief to be steady
-    ],
-)
+@pytest.mark.parametrize(("frame", "newtons", "seconds", "error"), [
+    ("link", [0.0, -20.0, 0.0], 1.2, -11.8),
+    ("base", [0.0, 0.0, -20.0], 1.2, -11.8),
+    ("link", [0.0, 20.0, 0.0], 1.0, -100.0),  # nothing is touched; not too brief
+    ("link", [0.0, -20.0, 0.0], 0.4, float("nan")),  # too brief to be steady
+])  # fmt: skip
 def test_the_error_of_a_force(frame: str, newtons: list[float], seconds: float, error: float, tmp_path: Path) -> None:
     file = tmp_path / "force.yaml"
     text = STEPS.replace("link", frame).replace("[0.0, -20.0, 0.0]", str(newtons))
@@ -141,20 +138,17 @@ steps:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("seconds", "command", "report"),
-    [
-        (0.4, "torque: [0, 0, 0, 50]", "s: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
-        (3.0, "torque: [0, 0, 0, 2]", "s: torque of joint 4: 2 N m are commanded, but 0.00 N m are measured"),
-        (3.0, "force: {frame: outer_link, newtons: [0, -4, 0]}", "s: force along (0, -1, 0): 4 N are commanded, but"),
-        (
-            0.4,
-            "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
-            "s: force along (0, 0, -1) at 0.28 m along outer_link: 70 N is commanded; allowed: up to",
-        ),
-        (0.4, "torque: [0, 0, 0, 0]", "press: not assessed: its force, torque or motion was commanded for at most 2 s"),
-    ],
-)
+@pytest.mark.parametrize(("seconds", "command", "report"), [
+    (0.4, "torque: [0, 0, 0, 50]", "s: torque of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
+    (3.0, "torque: [0, 0, 0, 2]", "s: torque of joint 4: 2 N m are commanded, but 0.00 N m are measured"),
+    (3.0, "force: {frame: outer_link, newtons: [0, -4, 0]}", "s: force along (0, -1, 0): 4 N are commanded, but"),
+    (
+        0.4,
+        "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
+        "s: force along (0, 0, -1) at 0.28 m along outer_link: 70 N is commanded; allowed: up to",
+    ),
+    (0.4, "torque: [0, 0, 0, 0]", "press: not assessed: its force, torque or motion was commanded for at most 2 s"),
+])  # fmt: skip
 def test_a_task_that_is_not_done_has_its_reason(seconds: float, command: str, report: str, tmp_path: Path) -> None:
     file = tmp_path / "task.yaml"
     press = f"- {{name: press, seconds: {seconds}, {command}}}"
