@@ -12,8 +12,16 @@ import pytest
 
 from wam_theory.friction_verdict import Domain
 from wam_theory.loop_design import loop_design
+from wam_theory.rounding import rounded_down, rounded_up
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 from wam_theory.thresholds import DESIGN
+
+
+@pytest.mark.parametrize("value", [0.00518, 0.000702, 6.85, 80.6, 1.09e-05, 0.0])
+def test_a_number_of_three_digits_stays_as_it_is(value: float) -> None:
+    assert (rounded_down(value), rounded_up(value)) == (value, value)
+    assert rounded_down(1.0001 * value) == value
+
 
 SOFTER = np.geomspace(0.03, 1.0, 12)
 
@@ -156,18 +164,15 @@ def test_a_delay_is_rounded_up_to_whole_periods() -> None:
     assert loop_design(NODE, of_margin(0.5), RATE, 0.0021).loop.delay_samples == 2
 
 
-@pytest.mark.parametrize(
-    ("changed", "rate", "delay", "text"),
-    [
-        ({"damping": 0.0}, 500.0, 0.0, "damping is 0; without damping no gain is stable"),
-        ({}, 0.0, 0.01, "give the rate of the samples"),
-        ({}, -1.0, 0.0, "rate is -1; it must be 0 or more"),
-        ({}, 1000.0, 1.0, "allowed: 50 periods"),
-        ({"inertia": 1e300}, 500.0, 0.0, r"inertia is 1e\+300; it must be between 1e-12 and 1e\+12"),
-        ({"contact_stiffness": 1e-20}, 0.0, 0.0, "contact_stiffness is 1e-20; it must be between"),
-        ({}, 1e15, 0.0, r"rate is 1e\+15; it must be between"),
-    ],
-)
+@pytest.mark.parametrize(("changed", "rate", "delay", "text"), [
+    ({"damping": 0.0}, 500.0, 0.0, "damping is 0; without damping no gain is stable"),
+    ({}, 0.0, 0.01, "give the rate of the samples"),
+    ({}, -1.0, 0.0, "rate is -1; it must be 0 or more"),
+    ({}, 1000.0, 1.0, "allowed: 50 periods"),
+    ({"inertia": 1e300}, 500.0, 0.0, r"inertia is 1e\+300; it must be between 1e-12 and 1e\+12"),
+    ({"contact_stiffness": 1e-20}, 0.0, 0.0, "contact_stiffness is 1e-20; it must be between"),
+    ({}, 1e15, 0.0, r"rate is 1e\+15; it must be between"),
+])  # fmt: skip
 def test_a_plant_beyond_computation_is_refused(changed: dict[str, float], rate: float, delay: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         loop_design(replace(NODE, **changed), IntegralLoop(0.01), rate, delay)

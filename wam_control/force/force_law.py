@@ -97,13 +97,13 @@ def _along(law: ForceLaw, axis: tuple[float, ...]) -> ForceLaw:
         return sum(a * b for a, b in zip(squares, values, strict=True))
 
     def radius(values: Sequence[float]) -> float:
-        used = [(square, value) for square, value in zip(squares, values, strict=True) if square > FORCE.negligible]
+        used = [(part, value) for part, value in zip(axis, values, strict=True) if part * part > FORCE.negligible]
         if not all(value for _, value in used):
             return 0.0
         first = used[0][1]
         if all(value == first for _, value in used):
             return first
-        return math.sqrt(sum(square for square, _ in used) / sum(a / (b * b) for a, b in used))
+        return math.hypot(*(part for part, _ in used)) / math.hypot(*(part / value for part, value in used))
 
     return ForceLaw(
         law.group,
