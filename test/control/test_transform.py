@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from wam_control.velocity.transform import Transform
+from wam_control.velocity.transform import Transform, TransformParameters
+from wam_control.velocity.transform_node import HELD, TransformNode
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import State
+from wam_description.wiring import Inputs
 
-ARM = Configuration.load(packaged("wam")).shared.arm
+SHARED = Configuration.load(packaged("wam")).shared
+ARM = SHARED.arm
 MATRIX = np.reshape(ARM.joint_from_motor, (4, 4))
 RANDOM = np.random.default_rng(4)
 
@@ -46,3 +49,12 @@ def test_a_wrong_number_of_values_is_refused(wrong: list[float]) -> None:
         transform.motor_velocity(wrong)
     with pytest.raises(ValueError):  # noqa: PT011
         transform.motor_effort([0.0] * 4, wrong)
+
+
+@pytest.mark.parametrize("begin", [0, 10**18])
+def test_torque_without_velocity_is_warned_of_after_a_while(begin: int) -> None:
+    node, effort, found = TransformNode(SHARED, TransformParameters(False)), State([], [], [1.0] * 4), []
+    for stamp in range(begin, begin + 120_000_000, 5_000_000):
+        given = {"gravity_effort": (stamp, effort), "joint_effort_command": (stamp, effort)}
+        found.append(node.effort(Inputs.of(stamp, 0.005, given)).get("status"))
+    assert found.index(HELD) > 6

@@ -1,5 +1,6 @@
 """Node `transform`: motor space to joint space and back."""
 
+import math
 from typing import Any, Final
 
 from wam_control.velocity.transform import Transform, TransformParameters
@@ -25,7 +26,8 @@ class TransformNode:
         self._transform = Transform(shared.arm, own.creep_correction)
         self._no_effort = State([], [], [0.0] * len(shared.arm.joints.names))
         self._limit = shared.ages.limit_ns("feedback")
-        self._velocity_stamp = self._since = 0  # newest velocity command; first torque without one, ns
+        self._velocity_stamp = 0  # ns, newest velocity command
+        self._since = math.inf  # ns, first torque without one
         self._is_held = False
 
     @reaction(Input("motor_states"), outputs=("joint_states",), thinned=True)
@@ -57,6 +59,6 @@ class TransformNode:
 
     def _look_for_hold(self, stamp: int, effort: list[float]) -> bool:
         """Whether torque has been commanded for a while without any velocity, so that the velocity loop opposes it."""
-        if not any(effort) or 0 <= stamp - self._velocity_stamp <= self._limit:
-            self._since = stamp
+        is_followed = not any(effort) or 0 <= stamp - self._velocity_stamp <= self._limit
+        self._since = stamp if is_followed else min(self._since, stamp)
         return stamp - self._since > self._limit
