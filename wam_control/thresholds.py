@@ -13,7 +13,8 @@ class MotionThresholds:
     caught_up: float = (
         1.25  # of the largest joint speed: on a path up to so fast the arm lags behind, and arrives in time
     )
-    goal_time: float = 1.0  # s after the end, in which the arm must be there, where the client gives no time
+    # s before a trajectory, in which the arm must be at rest, and after it, in which it must be there
+    goal_time: float = 1.0
     nodes: int = 200  # of a line, between which the joint angles are interpolated
     steepest: float = 15.0  # rad/m, of a joint on a line
     exact: float = 1e-10  # m, of the nodes of a line

@@ -89,8 +89,7 @@ class TrajectoryActionNode(Node):
             path = read_trajectory(goal.trajectory, self._names)
             following = TrajectoryGoal(
                 path,
-                self._shared.arm,
-                self._shared.motion,
+                self._shared,
                 self._tolerances(goal.path_tolerance),
                 self._tolerances(goal.goal_tolerance),
                 goal.goal_time_tolerance.sec + goal.goal_time_tolerance.nanosec * 1e-9,

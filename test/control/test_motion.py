@@ -74,25 +74,22 @@ def test_times_and_velocities_are_kept() -> None:
     assert motion.duration == 3.0
 
 
-@pytest.mark.parametrize(
-    ("points", "reason"),
-    [
-        ([PathPoint((9.0, -1.2, 0.2, 0.3))], "the trajectory: joint1 is commanded to 9 rad"),
-        ([PathPoint((0.5, -1.2, 0.2, 0.3), (), 0.2)], "joint1 of the trajectory reaches 4.69 rad/s; allowed: 1.2"),
-        ([PathPoint(tuple(START), (), 1.0), PathPoint(tuple(START), (), 0.5)], "have to rise"),
-        ([PathPoint((0.1, -1.2, 0.2, 0.3), (0.1, 0.0, 0.0, 0.0), 1.0)], "has to end at rest"),
-        ([], "no points"),
-        ([PathPoint((0.0, -1.2, 0.2, 0.3), (1e300, 0.0, 0.0, 0.0), 1e9)], "allowed: 1e-06 to 1e.06 s between them"),
-        (
-            [PathPoint((0.0, -1.2, 0.2, 0.3), (0.0, -1e308, 0.0, 0.0), 9.0)],
-            "joint2 of the trajectory reaches 1e.308 rad/s",
-        ),
-        (
-            [PathPoint((0.0, -1.2, 0.2, 0.3), (), 1.0), PathPoint((0.0, -1.2, 0.2, 0.3), (), 1.0 + 1e-9)],
-            "1e-09 s after",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("points", "reason"), [
+    ([PathPoint((9.0, -1.2, 0.2, 0.3))], "the trajectory: joint1 is commanded to 9 rad"),
+    ([PathPoint((0.5, -1.2, 0.2, 0.3), (), 0.2)], "joint1 of the trajectory reaches 4.69 rad/s; allowed: 1.2"),
+    ([PathPoint(tuple(START), (), 1.0), PathPoint(tuple(START), (), 0.5)], "have to rise"),
+    ([PathPoint((0.1, -1.2, 0.2, 0.3), (0.1, 0.0, 0.0, 0.0), 1.0)], "has to end at rest"),
+    ([], "no points"),
+    ([PathPoint((0.0, -1.2, 0.2, 0.3), (1e300, 0.0, 0.0, 0.0), 1e9)], "allowed: 1e-06 to 1e.06 s between them"),
+    (
+        [PathPoint((0.0, -1.2, 0.2, 0.3), (0.0, -1e308, 0.0, 0.0), 9.0)],
+        "joint2 of the trajectory reaches 1e.308 rad/s",
+    ),
+    (
+        [PathPoint((0.0, -1.2, 0.2, 0.3), (), 1.0), PathPoint((0.0, -1.2, 0.2, 0.3), (), 1.0 + 1e-9)],
+        "1e-09 s after",
+    ),
+])  # fmt: skip
 def test_a_trajectory_beyond_the_limits_is_refused_with_the_number(points: list[PathPoint], reason: str) -> None:
     with pytest.raises(ParameterError, match=reason):
         PostureMotion(START, path(*points), ARM, LIMITS)
@@ -146,7 +143,7 @@ def test_the_tool_is_never_further_than_the_reach_of_the_arm_and_comes_close_to_
 
 
 def test_a_streamed_trajectory_goes_on_and_one_that_ends_leaves_the_arm_where_it_is() -> None:
-    player = TrajectoryPlayer(ARM, LIMITS)
+    player = TrajectoryPlayer(SHARED)
     there = path(PathPoint((0.3, -1.0, 0.0, 0.5)))
     outs = [player.step(path(*there.points), START, REST, DT) for _ in range(1000)]  # an equal one each time
     assert outs[-1] is not None
@@ -160,7 +157,7 @@ def test_a_streamed_trajectory_goes_on_and_one_that_ends_leaves_the_arm_where_it
 
 
 def test_a_trajectory_that_is_refused_does_not_move_the_arm() -> None:
-    player = TrajectoryPlayer(ARM, LIMITS)
+    player = TrajectoryPlayer(SHARED)
     assert player.step(path(PathPoint((9.0, 0.0, 0.0, 0.0))), START, REST, DT) is None
     assert "joint1" in player.refusal
     assert player.step(path(PathPoint(tuple(START))), START, REST, DT) is not None

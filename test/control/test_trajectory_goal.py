@@ -1,5 +1,6 @@
 """What a client of FollowJointTrajectory is told, from the arm's angles alone."""
 
+from dataclasses import replace
 from itertools import count
 
 import pytest
@@ -8,7 +9,7 @@ from arms import CONFIGURATION, SHARED, WAM
 from wam_control.force.force_loop_node import ForceLoopNode
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.motion import PostureMotion
-from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
+from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal, TrajectoryPlayer
 from wam_control.thresholds import MOTION
 from wam_description.parameters import ParameterError
 from wam_description.signals import PathPoint, PosturePath, State
@@ -46,7 +47,7 @@ def goal(
     at_goal: dict[str, JointTolerance] | None = None,
     path: PosturePath = PATH,
 ) -> TrajectoryGoal:
-    return TrajectoryGoal(path, WAM, SHARED.motion, on_path or {}, at_goal or {}, 0.0)
+    return TrajectoryGoal(path, SHARED, on_path or {}, at_goal or {}, 0.0)
 
 
 def test_an_arm_that_follows_reaches_the_goal_at_its_time() -> None:
@@ -62,10 +63,9 @@ def test_an_arm_that_stays_does_not_reach_the_goal_and_is_named_with_the_number(
     assert time == pytest.approx(1.0 + MOTION.goal_time, abs=2 * PERIOD)
 
 
-@pytest.mark.parametrize(
-    ("allowed", "code"),
-    [(0.04, GoalCode.PATH_TOLERANCE_VIOLATED), (0.06, GoalCode.SUCCESSFUL), (-1.0, GoalCode.SUCCESSFUL)],
-)
+@pytest.mark.parametrize(("allowed", "code"), [
+    (0.04, GoalCode.PATH_TOLERANCE_VIOLATED), (0.06, GoalCode.SUCCESSFUL), (-1.0, GoalCode.SUCCESSFUL),
+])  # fmt: skip
 def test_the_tolerance_of_the_path_is_of_the_joint_it_names(allowed: float, code: GoalCode) -> None:
     tolerances = {"joint4": JointTolerance(allowed)}
     end, _ = follow(goal(tolerances, {"joint4": JointTolerance(-1.0)}), offset=0.05, joint=3)
@@ -108,6 +108,16 @@ def test_it_waits_until_the_arm_is_at_rest() -> None:
     assert waiting.desired is None
     assert waiting.time == 0.0
     assert follow(waiting)[0].code is GoalCode.SUCCESSFUL
+    moving = goal()
+    *_, end = [moving.step(State(list(START), [0.0, 0.2, 0.0, 0.0], []), PERIOD) for _ in range(202)]
+    assert end is not None
+    assert "a joint moves at 0.2 rad/s" in end.reason
+
+
+def test_an_arm_that_a_dither_shakes_is_at_rest() -> None:
+    player = TrajectoryPlayer(replace(SHARED, timing=replace(SHARED.timing, dither_cycle=40)))
+    found = [player.step(PATH, START, [0.0, 0.2 * (-1) ** k, 0.0, 0.0], PERIOD) for k in range(8)]
+    assert [one is not None for one in found] == [False] * 7 + [True], "after a whole cycle"
 
 
 def test_a_streamed_trajectory_begins_as_the_brakes_are_released() -> None:

@@ -28,7 +28,7 @@ class ForceLoopNode:
         self._loop = ForceLoop(shared.model_arm, shared.servo, own, shared.timing, shared.ages.command)
         self.tune = self._loop.tune
         self._shared = shared
-        self._player = TrajectoryPlayer(shared.arm, shared.motion)
+        self._player = TrajectoryPlayer(shared)
         self._command: Table | None = None
         self._known: TaskCommand | None = None
         self._refusal = ""

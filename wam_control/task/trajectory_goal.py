@@ -1,12 +1,15 @@
 """Trajectories of others: how a goal of FollowJointTrajectory goes, and a trajectory that a program streams."""
 
+import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
+from statistics import fmean
 from typing import Final, NamedTuple
 
 from wam_control.task.motion import Moving, PostureMotion
 from wam_control.thresholds import MOTION
-from wam_description.arm import Arm, MotionParameters
+from wam_description.arm import Shared
 from wam_description.parameters import ParameterError
 from wam_description.signals import PosturePath, State
 
@@ -44,8 +47,7 @@ class TrajectoryPlayer:
 
     Parameters
     ----------
-    arm : with the limits of the joints.
-    limits : of motions.
+    shared : of the arm, with the limits of joints and motions, and the dither.
 
     Attributes
     ----------
@@ -55,8 +57,12 @@ class TrajectoryPlayer:
     time : s, since it began.
     """
 
-    def __init__(self, arm: Arm, limits: MotionParameters) -> None:
-        self._arm, self._limits = arm, limits
+    def __init__(self, shared: Shared) -> None:
+        self._arm, self._limits, timing = shared.arm, shared.motion, shared.timing
+        # a dither shakes the joints: they rest where their mean over a cycle does
+        cycle = math.ceil(timing.dither_cycle / timing.outer_divisor)
+        self._velocities = deque[Sequence[float]](maxlen=max(cycle, 1))
+        self._waited = 0.0
         self.trajectory: PosturePath | None = None
         self.motion: PostureMotion | None = None
         self.time, self.refusal = 0.0, ""
@@ -72,10 +78,18 @@ class TrajectoryPlayer:
         """
         if trajectory != self.trajectory:
             self.trajectory, self.motion, self.time, self.refusal = trajectory, None, 0.0, ""
+            self._waited = 0.0
+            self._velocities.clear()
         if trajectory is None or self.refusal:
             return None
         if self.motion is None:
-            if max(map(abs, qd)) > MOTION.at_rest:
+            self._waited += dt
+            self._velocities.append(qd)
+            speed = max(abs(fmean(each)) for each in zip(*self._velocities, strict=True))
+            if speed > MOTION.at_rest or len(self._velocities) != self._velocities.maxlen:
+                if self._waited > MOTION.goal_time:
+                    allowed = f"a trajectory begins at rest, below {MOTION.at_rest:g} rad/s"
+                    self.refusal = f"a joint moves at {speed:.3g} rad/s; {allowed}; stop the arm, then send it again"
                 return None
             try:
                 self.motion = PostureMotion(q, trajectory, self._arm, self._limits)
@@ -92,8 +106,7 @@ class TrajectoryGoal:
     Parameters
     ----------
     path : of the client.
-    arm : with the limits of the joints.
-    limits : of motions.
+    shared : as of the player.
     on_path, at_goal : tolerances by name of the joint; usual is none on the path, and `arrived` at the goal.
     goal_time : s after the end; 0 for `goal_time`.
 
@@ -105,14 +118,13 @@ class TrajectoryGoal:
     def __init__(
         self,
         path: PosturePath,
-        arm: Arm,
-        limits: MotionParameters,
+        shared: Shared,
         on_path: Mapping[str, JointTolerance],
         at_goal: Mapping[str, JointTolerance],
         goal_time: float,
     ) -> None:
-        self._path, self._player = path, TrajectoryPlayer(arm, limits)
-        self._names = names = arm.joints.names
+        self._path, self._player = path, TrajectoryPlayer(shared)
+        self._names = names = shared.arm.joints.names
         self._on_path = [on_path.get(name, NO_TOLERANCE) for name in names]
         goal = [at_goal.get(name, NO_TOLERANCE) for name in names]
         self._at_goal = [one._replace(position=one.position or MOTION.arrived) for one in goal]
