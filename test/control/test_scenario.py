@@ -108,11 +108,18 @@ def test_a_force_rises_from_that_of_the_step_before_in_its_own_frame() -> None:
         ScenarioStep("press", 0.1, force=ForceCommand("base", (0.0, 0.0, -4.0)), rise=0.1),
         ScenarioStep("more", 0.1, force=ForceCommand("base", (0.0, 0.0, -8.0)), rise=0.05),
         ScenarioStep("elsewhere", 0.1, force=ForceCommand("outer_link", (0.0, 6.0, 0.0), (0.0, 0.0, 1.2)), rise=0.1),
+        ScenarioStep("turned", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 6.0), (0.0, -1.8, 0.0)), rise=0.1),
+        ScenarioStep("anywhere", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 4.0)), rise=0.1),
+        ScenarioStep("there", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 2.0), (0.0, -0.4, 0.0)), rise=0.1),
     ]
-    found = [out.force for out in play(Scenario(steps), 60)]
+    found = [out.force for out in play(Scenario(steps), 120)]
     assert [force.force[2] for force in found[:40:10]] == pytest.approx([0.0, -2.0, -4.0, -8.0])
     assert found[50].force == pytest.approx((0.0, 3.0, 0.0))
     assert found[50].torque == pytest.approx((0.0, 0.0, 0.6))
+    assert found[70][1:] == (pytest.approx((0.0, 3.0, 3.0)), pytest.approx((0.0, -0.75, 0.75))), "halfway between both"
+    assert [pinned_position(force) for force in found[81:120:18]] == [None, None, ("outer_link", pytest.approx(0.2))]
+    swept = Scenario([steps[0]._replace(seconds=1.0, chirp=Chirp(4.0, 2.0, 3.0))])
+    assert np.abs(np.diff([out.force.force[2] for out in play(swept, 199)])).max() < 0.6, "a chirp rises with its force"
     early = Scenario([steps[0]._replace(until_force=1.0), *steps[1:]])
     assert (play(early, 6) + play(early, 1, contact=touching(1.0)))[-1].force.force[2] == pytest.approx(-1.2)
     with pytest.raises(ParameterError, match="rise is 2 s; allowed: 0 to 1 s"):
@@ -171,10 +178,9 @@ def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_withou
     assert [k for k, out in enumerate(outs) if any(out.push.force)] == list(range(20))
 
 
-@pytest.mark.parametrize(
-    ("begin", "end", "acts"),
-    [(0.197, 0.2, [39]), (0.1011, 0.1039, [20]), (0.1039, 0.1061, [21]), (0.1, 0.105, [20]), (0.1, 0.1001, [20])],
-)
+@pytest.mark.parametrize(("begin", "end", "acts"), [
+    (0.197, 0.2, [39]), (0.1011, 0.1039, [20]), (0.1039, 0.1061, [21]), (0.1, 0.105, [20]), (0.1, 0.1001, [20]),
+])  # fmt: skip
 def test_a_push_between_two_outer_periods_lasts_for_one(begin: float, end: float, acts: list[int]) -> None:
     push = Push("outer_link", 0.3, (0.0, 10.0, 0.0), begin, end)
     outs = play(Scenario([ScenarioStep("pushed", 0.2, push=push), ScenarioStep("free", 0.1)]), 50)
@@ -682,6 +688,9 @@ def test_a_step_made_in_python_sets_the_parameters_of_a_controller_that_takes_th
 @pytest.mark.parametrize(("more", "chirp", "text"), [
     ({}, 0.0, "step 'press': 70 N is commanded; allowed: up to force_limit, 60 N; command less, or raise force_loop:"),
     ({}, 20.0, "90 N is commanded; allowed"),
+    ({"torque": [0.0, 0.0, 0.0, 99.0]}, 0.0, "step 'set': 99 N m is commanded; allowed: up to torque_limit, 40 N m"),
+    ({"task": {"axes": [{"force": 61.0, "cover": "outer_link", "along": [0, 0, 1], "contact_position": 0.3}]}}, 0.0,
+     "step 'set': 61 N is commanded"),
     ({"set": {"force_loop": {"force_limit": 69.0}}}, 0.0, "70 N is commanded; allowed: up to force_limit, 69 N"),
     ({"set": {"force_loop": {"force_limit": 70.0}}}, 0.0, ""),
 ])  # fmt: skip

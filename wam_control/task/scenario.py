@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wam_control.force.contact_place import torque_of_position
+from wam_control.force.contact_place import pinned_position, torque_of_position
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.task.motion import GoalMotion, LineMotion, PostureMotion
 from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
@@ -58,7 +58,8 @@ FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable", "tare")
 CHIRP_KEYS = ("newtons", "from", "to")
 NO_FORCE = ForceCommand("base", ZERO)
-FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
+FORCE_LOOP, FOLLOWED = "force_loop", "joint_speed_limit"
+LARGEST = {"force_limit": "N", "torque_limit": "N m"}  # of the force loop
 Motion = GoalMotion | PostureMotion | LineMotion
 
 
@@ -275,21 +276,26 @@ class Scenario:
         return True
 
     def _force(self, step: ScenarioStep) -> ForceCommand:
-        if self._elapsed < step.rise:
-            return _between(self._before, step.force, self._elapsed / step.rise)
-        if step.chirp is None:
-            return step.force
-        share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
-        return _between(NO_FORCE, step.force, 1.0 + share)
+        force = step.force
+        if step.chirp is not None:
+            share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*force.force)
+            force = _between(NO_FORCE, force, 1.0 + share)
+        return _between(self._before, force, self._elapsed / step.rise) if self._elapsed < step.rise else force
 
 
 def _between(before: ForceCommand, force: ForceCommand, share: float) -> ForceCommand:
-    """A share of the way from one force to another; in another frame the first one is none."""
+    """A share of the way from one force to another, and from one place to another; in another frame the first is none.
+
+    Where only one has a place, it counts, or does not, from the beginning.
+    """
     start = before if before.frame == force.frame else NO_FORCE
-    (x, y, z), (tx, ty, tz) = (
-        [a + share * (b - a) for a, b in zip(*pair, strict=True)] for pair in zip(start[1:], force[1:], strict=True)
-    )
-    return ForceCommand(force.frame, (x, y, z), (tx, ty, tz))
+    x, y, z = (a + share * (b - a) for a, b in zip(start.force, force.force, strict=True))
+    pinned = pinned_position(force)
+    if pinned is None:
+        return force._replace(force=(x, y, z))
+    goal = pinned[1]
+    _, place = pinned_position(start) or pinned
+    return ForceCommand(force.frame, (x, y, z), torque_of_position((x, y, z), place + share * (goal - place)))
 
 
 def motion_of(
@@ -470,7 +476,7 @@ def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: C
     shared = configuration.shared
     start = shared.arm.joints.start if shared.is_simulated else ()
     loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in shared.nodes else {}
-    _require_forces(where, steps, float(loop.get(LARGEST_FORCE, math.inf)))
+    _require_forces(where, steps, {name: float(loop.get(name, math.inf)) for name in LARGEST})
     _require_motions(where, steps, shared, start, float(loop.get(FOLLOWED, math.inf)))
 
 
@@ -482,16 +488,20 @@ def _set_to(step: ScenarioStep, name: str, before: float) -> float:
     return value
 
 
-def _require_forces(where: str, steps: Sequence[ScenarioStep], limit: float) -> None:
-    """Refuse forces that the force loop would refuse in each pose; `limit` is its largest force, N, at the start."""
+def _require_forces(where: str, steps: Sequence[ScenarioStep], limits: dict[str, float]) -> None:
+    """Refuse forces and torques that the force loop would refuse in each pose; `limits` are those at the start."""
     for step in steps:
-        limit = _set_to(step, LARGEST_FORCE, limit)
-        largest = math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0)
-        require(
-            largest <= limit,
-            f"{where}, step '{step.name}': {largest:.4g} N is commanded; allowed: up to {LARGEST_FORCE}, {limit:g} N; "
-            f"command less, or raise {FORCE_LOOP}:{LARGEST_FORCE}",
-        )
+        limits = {name: _set_to(step, name, limit) for name, limit in limits.items()}
+        asked = [("force_limit", math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0))]
+        forces = [axis for axis in (step.task.axes if step.task else ()) if axis.kind is AxisKind.FORCE]
+        asked += [("torque_limit" if axis.joint >= 0 else "force_limit", abs(axis.value or 0.0)) for axis in forces]
+        for name, size in asked:
+            limit, unit = limits[name], LARGEST[name]
+            require(
+                size <= limit,
+                f"{where}, step '{step.name}': {size:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} "
+                f"{unit}; command less, or raise {FORCE_LOOP}:{name}",
+            )
 
 
 def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
