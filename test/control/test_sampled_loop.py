@@ -35,16 +35,9 @@ def margin(
 ) -> float:
     """Largest stable G_I at the tip, m/s/N."""
     loop = SampledLoop(arm, clock, servo)
-    lever = np.array([LEVER])
-    axes = Axes(
-        sense=np.array([[1.0 / LEVER]]),
-        move=np.array([[1.0 / LEVER]]),
-        gain=np.array([gain]),
-        proportional_gain=np.array([more.get("proportional", 0.0)]),
-        hold=np.zeros((1, 1)),
-        filter_time=0.0,
-        delay=more.get("delay", 0),
-    )
+    lever, one, none = np.array([LEVER]), np.array([[1.0 / LEVER]]), np.zeros((1, 1))
+    gains = np.array([gain]), np.array([more.get("proportional", 0.0)])
+    axes = Axes(one, one, *gains, none, none, filter_time=0.0, delay=more.get("delay", 0))
     contact = more.get("stiffness", STIFFNESS) * np.outer(lever, lever)
     return gain * loop.margin([0.0], axes, contact, Feedback("contact_estimate", (0.0,), 0.0), SCALES)
 

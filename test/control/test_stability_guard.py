@@ -339,7 +339,7 @@ def test_the_margin_of_a_joint_torque_follows_the_square_of_the_contact_position
 
     def margin(at: float) -> float:
         pressed = [
-            GuardedForces((each,), one, one, np.array([0.004]), np.zeros(1), 0.0 * one)
+            GuardedForces((each,), one, one, np.array([0.004]), np.zeros(1), 0.0 * one, 0.0 * one, ())
             for each in guard.contacts([0.0], "tube", at, 0.0)
         ]
         return min(guard.scales(task._replace(feedback=Feedback("contact_estimate", (), 0.0)), pressed))

@@ -111,14 +111,11 @@ def test_the_point_slides_with_the_commanded_velocity_while_it_presses() -> None
     assert world.force(DOWN) == pytest.approx(10.0, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("others", "slid"),
-    [
-        ((), 0.022),
-        ((force(0.0, Y),), 0.022),  # at the same position: the way counts once
-        ((TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, Y, 0.05),), 0.0),
-    ],
-)
+@pytest.mark.parametrize(("others", "slid"), [
+    ((), 0.022),
+    ((force(0.0, Y),), 0.022),  # at the same position: the way counts once
+    ((TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, Y, 0.05),), 0.0),
+])  # fmt: skip
 def test_a_pinned_point_stays_on_what_is_to_be_touched_unless_another_motion_is_commanded(
     others: tuple[TaskAxis, ...], slid: float
 ) -> None:
@@ -171,6 +168,11 @@ def test_an_impedance_is_slowed_by_the_factor_of_the_guard(joint: int, damping: 
     assert speeds[50] == 0.0, "it waits until it is assessed, as the force was"
     assert (factor := world.loop.supervision.factor) < 0.9
     assert speeds[-1] == pytest.approx(factor * (2.0 - band) / damping, rel=0.02)
+    world.hand, reports = np.zeros(4), []
+    for stiffness in (0.0, 1.0):
+        world.step(base(axis._replace(damping=damping, stiffness=stiffness)), 150)
+        reports.append(world.loop.supervision.report)
+    assert reports[1] is not reports[0], "another stiffness is assessed, too"
 
 
 def impedance(along: Triple, value: float | None = None, stiffness: float = 400.0) -> TaskAxis:
@@ -315,19 +317,24 @@ def test_the_guard_considers_one_force_of_a_task_as_a_force_alone() -> None:
     assert min(guard.scales(task, [forces])) == pytest.approx(min(guard.scales(task, forces.contacts)), rel=0.01)
 
 
+def test_the_guard_scales_the_spring_of_an_impedance_as_the_loop_does() -> None:
+    guard, task, forces = linear_loop(Springs(), base(impedance(Y, stiffness=4000.0)))
+    assert min(guard.scales(task, [forces], [0.1])) == 0.1
+
+
 @pytest.mark.slow
 def test_the_guard_considers_the_forces_of_a_task_together() -> None:
     """Its linear law is that of the task: joint velocities per torque of the world and per joint angle."""
     stiff = TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, X, None, 0.0, 400.0, 100.0)
     task = base(force(10.0), stiff, position(None, Y, 0.1))
     _, _, forces = linear_loop(Springs(), task)
-    still = np.array(settled(task, np.zeros(4), np.zeros(4)))
+    still, held = np.array(settled(task, np.zeros(4), np.zeros(4))), forces.hold + forces.move @ forces.spring
     for joint in np.eye(4):
         torque, angle = 0.4 * joint, 0.005 * joint  # N m, rad
         expected = forces.move @ (forces.gain * (forces.sense @ torque))
         found = settled(task, torque, np.zeros(4)) - still
         assert -found == pytest.approx(expected, abs=4e-3)
-        assert still - settled(task, np.zeros(4), angle) == pytest.approx(forces.hold @ angle, abs=4e-3)
+        assert still - settled(task, np.zeros(4), angle) == pytest.approx(held @ angle, abs=4e-3)
 
 
 def settled(task: TaskCommand, torque: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -400,17 +407,14 @@ def test_a_force_without_a_lever_is_refused() -> None:
     assert refused(base(force(5.0, (x, y, z), 0.4)), straight)
 
 
-@pytest.mark.parametrize(
-    ("axis", "reason"),
-    [
-        (TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, 0.0, 0.0, 5.0), "damping is 5; allowed: .* 70"),
-        (TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, 0.0, 5000.0, 100.0), "allowed: up to 800"),
-        (TaskAxis(AxisKind.IMPEDANCE, 1, value=None, damping=0.5), "damping is 0.5; allowed: .*least_joint_damping, 5"),
-        (TaskAxis(AxisKind.FORCE, 2, value=99.0), "99 N m is commanded; allowed: up to torque_limit, 40 N m"),
-        (TaskAxis(AxisKind.FORCE, -1, COVER, PLACE, DOWN, 99.0), "99 N is commanded; allowed: up to force_limit"),
-        (TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, DOWN, 9.0), "9 m/s is commanded; allowed: .*0.5 m/s"),
-    ],
-)
+@pytest.mark.parametrize(("axis", "reason"), [
+    (TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, 0.0, 0.0, 5.0), "damping is 5; allowed: .* 70"),
+    (TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, Y, None, 0.0, 5000.0, 100.0), "allowed: up to 800"),
+    (TaskAxis(AxisKind.IMPEDANCE, 1, value=None, damping=0.5), "damping is 0.5; allowed: .*least_joint_damping, 5"),
+    (TaskAxis(AxisKind.FORCE, 2, value=99.0), "99 N m is commanded; allowed: up to torque_limit, 40 N m"),
+    (TaskAxis(AxisKind.FORCE, -1, COVER, PLACE, DOWN, 99.0), "99 N is commanded; allowed: up to force_limit"),
+    (TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, DOWN, 9.0), "9 m/s is commanded; allowed: .*0.5 m/s"),
+])  # fmt: skip
 def test_a_value_beyond_its_limit_is_refused_with_the_limit(axis: TaskAxis, reason: str) -> None:
     assert re.search(reason, refused(base(axis)))
 
@@ -428,6 +432,15 @@ def test_a_task_without_sensors_is_not_done() -> None:
     out = loop.step(ForceInput(State(POSE, REST, [1.0] * 4), DT, task=base(force(5.0))))
     assert out.rows == ()
     assert out.velocity == pytest.approx(REST)
+
+
+def test_a_force_that_has_gone_to_zero_presses_no_more() -> None:
+    world = Springs(springs={DOWN: 4000.0})
+    world.step(base(force(10.0)), 100)
+    world.springs, world.q = {}, world.q + 0.1
+    world.step(base(force(0.0)), 2)
+    world.step(None, 200)
+    assert world.loop.tare() == "", "it has left what it touched"
 
 
 def test_a_force_at_the_estimated_place_follows_the_estimate() -> None:
@@ -539,20 +552,17 @@ def test_a_task_is_the_same_after_it_was_a_table() -> None:
     assert task_of(Table("base", ()), WAM) is None
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "reason"),
-    [
-        (0, 9.0, "kind is 9; allowed: 1 force"),
-        (1, 0.0, "joint is 0, cover 'outer_link'.*give a joint alone, 0 to 3, or"),
-        (2, 7.0, "link is 7; allowed: 0 to 1"),
-        (3, 2.0, "contact_position is 2.0 m; allowed: 0 to 0.4064"),
-        (6, 0.0, "along is .*; give a direction that is not zero"),
-        (8, math.nan, "rate is nan; it must be a finite number"),
-        (7, math.nan, "value is not a number"),
-        (8, 0.1, "rate is 0.1; it is for a position"),
-        (9, 5.0, "stiffness and damping are for an impedance only"),
-    ],
-)
+@pytest.mark.parametrize(("column", "value", "reason"), [
+    (0, 9.0, "kind is 9; allowed: 1 force"),
+    (1, 0.0, "joint is 0, cover 'outer_link'.*give a joint alone, 0 to 3, or"),
+    (2, 7.0, "link is 7; allowed: 0 to 1"),
+    (3, 2.0, "contact_position is 2.0 m; allowed: 0 to 0.4064"),
+    (6, 0.0, "along is .*; give a direction that is not zero"),
+    (8, math.nan, "rate is nan; it must be a finite number"),
+    (7, math.nan, "value is not a number"),
+    (8, 0.1, "rate is 0.1; it is for a position"),
+    (9, 5.0, "stiffness and damping are for an impedance only"),
+])  # fmt: skip
 def test_a_row_that_is_none_is_refused_with_what_is_allowed(column: int, value: float, reason: str) -> None:
     row = list(table_of(base(force(10.0)), WAM.covers.names).rows[0])
     row[column] = value

@@ -179,7 +179,8 @@ class Supervision:
             return []
         n = len(q)
         move, left = linear([axis.along for axis in axes], n)
-        hold, sense, gain = own.posture_gain * left, np.zeros((len(axes), n)), np.zeros((2, len(axes)))
+        hold, gain = own.posture_gain * left, np.zeros((2, len(axes)))
+        sense, spring = np.zeros((2, len(axes), n))
         for i, axis in enumerate(axes):
             if axis.of.is_sensed:
                 sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
@@ -188,13 +189,13 @@ class Supervision:
                 law = self.torque_law if axis.is_joint else self.force_law.along(axis.in_frame.tolist())
                 at = max(axis.of.joint, 0)
                 gain[:, i] = law.gain[at], law.proportional_gain[at]
-            elif axis.of.kind is not AxisKind.VELOCITY:
-                rate = own.task.largest_rate
-                if axis.of.kind is AxisKind.IMPEDANCE:
-                    damping = own.task.damping(axis.of)
-                    rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
-                hold = hold + rate * np.outer(move[:, i], axis.along)
-        return [GuardedForces(each, sense, move, gain[0], gain[1], hold) for each in together]
+            elif axis.of.kind is AxisKind.IMPEDANCE:
+                damping = own.task.damping(axis.of)
+                gain[0, i], spring[i] = 1.0 / damping, axis.of.stiffness / damping * axis.along
+            elif axis.of.kind is AxisKind.POSITION:
+                hold = hold + own.task.largest_rate * np.outer(move[:, i], axis.along)
+        others = tuple(axis.of._replace(value=0.0, rate=0.0) for axis in axes if not axis.is_force)
+        return [GuardedForces(each, sense, move, gain[0], gain[1], hold, spring, others) for each in together]
 
     @property
     def factor(self) -> float:
@@ -266,11 +267,11 @@ class Watch:
 
 
 def _differs(one: GuardedForces, other: GuardedForces) -> bool:
-    """Whether forces have other contacts or gains."""
+    """Whether forces have other contacts, gains or axes beside them."""
     if len(one.contacts) != len(other.contacts) or any(map(_is_apart, one.contacts, other.contacts)):
         return True
-    return (
-        one.gain.tolist() != other.gain.tolist() or one.proportional_gain.tolist() != other.proportional_gain.tolist()
+    return one.others != other.others or any(
+        a.tolist() != b.tolist() for a, b in zip(one[3:5], other[3:5], strict=True)
     )
 
 

@@ -44,6 +44,7 @@ class Axes(NamedTuple):
     move : (n, p), joint velocity per velocity of each axis.
     gain, proportional_gain : (p,), G_I and G_P.
     hold : (n, n), joint velocity per joint angle, by which the posture is held, 1/s.
+    spring : (p, n), velocity of each axis per joint angle by its stiffness, which is scaled as the gains are.
     filter_time : time constant of the low pass on the force, s; the rate of G_P is taken behind it.
     delay : inner periods from the sample to the use of its command, whole outer periods included.
     """
@@ -53,6 +54,7 @@ class Axes(NamedTuple):
     gain: Array
     proportional_gain: Array
     hold: Array
+    spring: Array
     filter_time: float
     delay: int
 
@@ -149,8 +151,10 @@ class SampledLoop:
         outer = self.tick * self.divisor
         lag = axes.filter_time + (feedback.lag if feedback.kind == "contact_estimate" else 0.0)
         force = before + (axes.sense @ shown @ start - before) * outer / (outer + lag)
+        at = self.joint_from_motor @ start[:n]
         speed = axes.gain[:, None] * force + axes.proportional_gain[:, None] * (force - before) / outer
-        held = axes.hold @ (self.joint_from_motor @ start[:n])
+        speed = speed + axes.spring @ at
+        held = axes.hold @ at
 
         def scaled(scale: float) -> Array:
             x, integral = start, integrals

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wam_control.force.force_axis import ForceAxes, ForceAxis, ForcePlace, SensingParameters
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
+from wam_control.force.task import TaskAxis
 from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter
@@ -120,7 +121,9 @@ class GuardedForces(NamedTuple):
     Attributes
     ----------
     contacts : all of them, in one posture.
-    sense, move, gain, proportional_gain, hold : as in `wam_control.force.sampled_loop.Axes`, of all axes of the task.
+    sense, move, gain, proportional_gain, hold, spring : as in `wam_control.force.sampled_loop.Axes`, of all axes of the
+        task.
+    others : axes that are no forces, without where they lead.
     """
 
     contacts: tuple[GuardedContact, ...]
@@ -129,6 +132,8 @@ class GuardedForces(NamedTuple):
     gain: Array
     proportional_gain: Array
     hold: Array
+    spring: Array
+    others: tuple[TaskAxis, ...]
 
     @property
     def q(self) -> tuple[float, ...]:
@@ -348,12 +353,13 @@ class StabilityGuard:
         n = len(self.arm.joints.names)
         delay = task.delay_samples * timing.outer_divisor + timing.outer_delay + late
         if isinstance(contact, GuardedForces):
-            return Axes(*contact[1:], task.filter_time, delay)
+            return Axes(*contact[1:-1], task.filter_time, delay)
         axis, law = self.axis(contact), task.law
         lever = axis.lever
         hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / float(lever @ lever))
         gains = np.array([max(law.gain)]), np.array([max(law.proportional_gain)])
-        return Axes(axis.sense[None], axis.move[:, None], *gains, hold, task.filter_time, delay)
+        none = np.zeros((1, n))
+        return Axes(axis.sense[None], axis.move[:, None], *gains, hold, none, task.filter_time, delay)
 
 
 def posture_of(contact: GuardedContact) -> str:
