@@ -11,6 +11,7 @@ from test_held_arm import OWN
 
 from wam_control.force.force_loop import ForceInput
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, unit
 from wam_description.event import Code, Event
 from wam_description.signals import NO_CONTACT, ForceCommand, State
 
@@ -31,14 +32,19 @@ def radial(q: Sequence[float], newtons: float, frame: str) -> tuple[float, float
     return x, y, z
 
 
-def asked(own: ForceLoopParameters, q: Sequence[float], frame: str, force: tuple[float, ...], sd: float) -> Event:
+def asked(
+    own: ForceLoopParameters, q: Sequence[float], frame: str, force: tuple[float, ...], sd: float, is_task: bool = False
+) -> Event:
     """The event of a force that is commanded in free space for some time, after a tenth of it."""
     loop = force_loop(ARM, own)
     joints, sensors = State(list(q), STILL, DRIVEN), State(list(q), STILL, BODY.gravity_torque(q).tolist())
     x, y, z = force
     for part in [0.1] * LONG + [1.0] * LONG:
         command = ForceCommand(frame, (part * x, part * y, part * z))
-        loop.step(ForceInput(joints, DT, sensors, NO_CONTACT, STILL, [sd] * 4 if sd else None, command))
+        against = unit((-x, -y, -z)), -part * math.hypot(x, y, z)
+        task = TaskCommand(frame, (TaskAxis(AxisKind.FORCE, -1, own.contact_cover, own.contact_position, *against),))
+        what = {"task": task} if is_task else {"command": command}
+        loop.step(ForceInput(joints, DT, sensors, NO_CONTACT, STILL, [sd] * 4 if sd else None, **what))
     return loop.event
 
 
@@ -48,10 +54,9 @@ def ways(event: Event) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["outer_link"])
-@pytest.mark.parametrize(
-    ("own", "bend", "newtons", "sd"),
-    [(OWN, 0.15, 5.0, 0.0), (OWN, 0.3, 2.0, 0.0), (UNPINNED, 0.3, 2.0, 0.0), (MOTORS, 0.8, 3.0, 0.05)],
-)
+@pytest.mark.parametrize(("own", "bend", "newtons", "sd"), [
+    (OWN, 0.15, 5.0, 0.0), (OWN, 0.3, 2.0, 0.0), (UNPINNED, 0.3, 2.0, 0.0), (MOTORS, 0.8, 3.0, 0.05),
+])  # fmt: skip
 def test_what_is_advised_is_obeyed(
     own: ForceLoopParameters, bend: float, newtons: float, sd: float, frame: str
 ) -> None:
@@ -84,10 +89,10 @@ def test_where_nothing_helps_all_was_tried_and_nothing_is_advised() -> None:
 
 
 @pytest.mark.slow
-def test_no_more_force_is_advised_than_may_be_commanded() -> None:
+@pytest.mark.parametrize("is_task", [False, True])
+def test_no_more_force_is_advised_than_may_be_commanded(is_task: bool) -> None:
     q = bent(0.3)
-    free, limited = (
-        asked(replace(OWN, force_limit=most), q, "base", radial(q, 2.0, "base"), 0.0) for most in (60.0, 2.4)
-    )
+    force = radial(q, 2.0, "base")
+    free, limited = (asked(replace(OWN, force_limit=most), q, "base", force, 0.0, is_task) for most in (60.0, 2.4))
     assert "more_force" in free.values
     assert "more_force" not in limited.values

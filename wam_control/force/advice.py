@@ -88,7 +88,7 @@ def tries(
             break
     for factor in FORCE.more:
         larger = float(f"{factor * size:.2g}")
-        is_good = larger <= own.force_limit and is_obeyed(q, places, larger)
+        is_good = abs(larger) <= own.force_limit and is_obeyed(q, places, larger)
         yield {"more_force": larger} if is_good else {}
         if is_good:
             break
