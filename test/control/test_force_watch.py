@@ -176,6 +176,10 @@ def test_an_arm_that_moves_on_without_its_force_stops_at_the_free_travel_for_goo
     assert pressed.last(0.5, 0.0, way=sign * 0.00149) == []
     assert pressed.last(0.01, 0.0, way=sign * 0.00149) == travelled
     assert pressed.last(1.0) == travelled
+    turned = Pressed()
+    assert turned.last(0.5, 0.0, way=sign * 0.00149) == []
+    turned.axis = AXIS._replace(in_frame=-AXIS.in_frame)
+    assert turned.last(0.9, 0.0, way=sign * 0.00149) == [], "on the way back"
 
 
 @pytest.mark.parametrize(("force", "is_led"), [(FORCE, True), (FORCE, False), (0.0, True)])
@@ -275,15 +279,12 @@ def path(seconds: float) -> Callable[[float], float]:
     return lambda time: motion.at(time).position[0]
 
 
-@pytest.mark.parametrize(
-    "goal",
-    [
-        lambda time: 2.0,  # a goal may be set anywhere
-        lambda time: 2.0 * (round(time) % 2),
-        lambda time: 0.9 * FASTEST * (time - time % 0.5),  # streamed at 2 Hz
-        path(3.0),
-    ],
-)
+@pytest.mark.parametrize("goal", [
+    lambda time: 2.0,  # a goal may be set anywhere
+    lambda time: 2.0 * (round(time) % 2),
+    lambda time: 0.9 * FASTEST * (time - time % 0.5),  # streamed at 2 Hz
+    path(3.0),
+])  # fmt: skip
 def test_an_arm_that_follows_as_its_law_has_it_is_never_late(goal: Callable[[float], float]) -> None:
     assert not any(moved(goal))
 

@@ -14,6 +14,8 @@ import math
 from collections import deque
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -182,7 +184,7 @@ class ForceWatch:
         # of the largest doubt: 1 while it is refused, then somewhat more, and any once it is decided
         self._slack, self._has_settled = 1.0, False
         self._commanded: Array | float = math.nan
-        self._travel = 0.0
+        self._travel = np.zeros(3)  # m, in the frame of the command
         self._pattern: Array | None = None  # m, torques per force that it did not explain as it settled
 
     def step(self, axis: CommandedAxis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
@@ -208,7 +210,7 @@ class ForceWatch:
         if self._slack == 1.0:
             return events
         is_reached = self.touch.is_there and abs(error) <= known.tolerance
-        self.ended = self.ended or self._contradicted(axis, seen, dt) or self._travelled(seen, is_reached, own)
+        self.ended = self.ended or self._contradicted(axis, seen, dt) or self._travelled(axis, seen, is_reached, own)
         if self.ended:
             return [self.ended]
         late = limits.settling_time
@@ -275,14 +277,15 @@ class ForceWatch:
             return None
         return holding(Code.UNEXPLAINED, "other_link", touched=seen.touched, **_where(axis))
 
-    def _travelled(self, seen: Seen, is_reached: bool, own: ForceLoopParameters) -> Event | None:
+    def _travelled(self, axis: CommandedAxis, seen: Seen, is_reached: bool, own: ForceLoopParameters) -> Event | None:
         """The arm has moved too far along or against a force that is not reached."""
-        self._travel += seen.way
+        self._travel = self._travel + seen.way * axis.in_frame
+        way, allowed = float(self._travel.dot(axis.in_frame)), own.limits.free_travel
         if is_reached:
-            self._travel = 0.0 if seen.is_led else min(self._travel, 0.0)
-        if abs(self._travel) <= own.limits.free_travel:
+            way = 0.0 if seen.is_led else min(way, 0.0)
+            self._travel = way * axis.in_frame
+        if abs(way) <= allowed:
             return None
-        way, allowed = self._travel, own.limits.free_travel
         return holding(Code.AT_LIMIT, "free_travel", way=way, allowed=allowed, has_settled=float(self._has_settled))
 
     def _unexplained(
