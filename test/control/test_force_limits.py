@@ -55,12 +55,14 @@ def test_a_joint_beyond_its_end_is_brought_back_slowly() -> None:
         assert (high >= -0.3).all()
         q = q + high * DT
     assert q == pytest.approx(UPPER, abs=1e-3)
+    slow = joint_bounds((UPPER + 0.2).tolist(), JOINTS, replace(OWN, joint_speed_limit=0.05), STILL, math.inf)
+    assert set(slow[1]) == {-0.05}, "no faster than any other motion"
     free = joint_bounds((UPPER + 0.2).tolist(), JOINTS, limited(joint_gain=0.0), STILL, math.inf)
     assert set(free[1]) == {OWN.joint_speed_limit}, "ends that are not watched"
 
 
 @pytest.mark.parametrize("q", POSES)
-@pytest.mark.parametrize("own", [OWN, MOTORS])
+@pytest.mark.parametrize("own", [OWN, MOTORS, replace(OWN, force_filter=0.0)])
 def test_an_approach_hits_no_harder_than_allowed_and_a_touch_rises_no_faster_than_it_is_measured(
     own: ForceLoopParameters, q: tuple[float, ...]
 ) -> None:

@@ -189,7 +189,7 @@ class ForceLoopParameters:
     @cached_property
     def latency(self) -> float:
         """By how much the measured force is late, s."""
-        return self.force_filter + self.guard.feedback_lag * self.is_estimated
+        return max(self.force_filter + self.guard.feedback_lag * self.is_estimated, FORCE.negligible)
 
     @cached_property
     def rise_time(self) -> float:

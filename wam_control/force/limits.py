@@ -28,7 +28,7 @@ def joint_bounds(
         fastest = gain * (distance - margin) if gain else speed
         if fastest >= speed:  # as most joints are: far from their ends
             return speed
-        return max(fastest, 0.0) if distance >= 0.0 else max(gain * distance, -FORCE.slow)
+        return max(fastest, 0.0) if distance >= 0.0 else max(gain * distance, -min(FORCE.slow, speed))
 
     ends = zip(joints.lower, q, joints.upper, before, strict=True)
     each = [(-towards(at - lower), towards(upper - at), last) for lower, at, upper, last in ends]
@@ -159,6 +159,6 @@ def followed(posture: Array, axis: CommandedAxis, body: RigidBody, q: Angles, ow
     assert axis.sensed is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
     slide = FORCE.slide_slope * length(body.point_jacobian(q, axis.place.cover, point).dot(posture))
-    pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(own.latency, FORCE.negligible))
+    pace = min(max(own.force_gain), yielding(axis.sensed, own) / own.latency)
     most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)
     return posture * (most / slide) if slide > most else posture
