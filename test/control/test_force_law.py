@@ -9,6 +9,7 @@ from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World
 
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop import ForceCommand, ForceInput, ForceOutput
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_description.event import refused
 from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
@@ -50,6 +51,11 @@ def test_each_axis_has_a_law_of_its_own() -> None:
         assert lever(POSE, n) @ out.velocity == pytest.approx(expected, rel=1e-6)
 
 
+def test_a_deadband_may_be_as_small_as_it_likes() -> None:
+    small = law(deadband=(3e-170, 3e-170, 1e-160)).along((0.6, 0.0, 0.8))
+    assert small.deadband == (pytest.approx(5e-170, rel=1e-9),)
+
+
 def test_proportional_action_of_each_axis_has_the_saturation_of_that_axis() -> None:
     law = ForceLaw("torque", ("a", "b"), (0.0, 0.0), (0.1, 0.1), (5.0, 1.0), (0.0, 0.0))
     assert [law.velocity(axis, 3.0, 0.0, DT) for axis in (0, 1)] == pytest.approx([0.3 / DT, 0.1 / DT])
@@ -76,17 +82,20 @@ def test_a_delayed_velocity_comes_so_many_periods_later(samples: int) -> None:
     reported = [float(along @ ask(loop, World(400.0, force=f), down(9.0)).velocity) for f in (2.0, 3.0, 4.0, 5.0, 6.0)]
     expected = [0.0] * samples + [GAIN * (9.0 - f) for f in (2.0, 3.0, 4.0, 5.0, 6.0)]
     assert reported == pytest.approx(expected[:5], rel=1e-6, abs=1e-9)
+    found = []
+    for value in [0.5] * 6 + [99.0] * 4 + [0.2] * 4:  # what is beyond the limit, it holds
+        task = TaskCommand("base", (TaskAxis(AxisKind.VELOCITY, 0, value=value),))
+        found.append(ask(loop, World(), task=task).velocity[0])
+    expected = [0.0] * samples + [0.5] * (6 - samples) + [0.0] * (4 + samples) + [0.2] * (4 - samples)
+    assert found == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"force_gain": (1.0, 2.0)}, "'force_gain' has 2 values; give 3, one for each of x, y, z, or one for all"),
-        ({"torque_deadband": (1.0,) * 3}, "'torque_deadband' has 3 values; give 4, one for each of joint1"),
-        ({"force_deadband": (LIMIT := 20.0,)}, "force_error_limit of x is 20; it must be above force_deadband, 20"),
-        ({"torque_error_limit": (5.0, 5.0, 0.0, 5.0)}, "torque_error_limit of joint3 is 0; it must be above"),
-    ],
-)
+@pytest.mark.parametrize(("change", "text"), [
+    ({"force_gain": (1.0, 2.0)}, "'force_gain' has 2 values; give 3, one for each of x, y, z, or one for all"),
+    ({"torque_deadband": (1.0,) * 3}, "'torque_deadband' has 3 values; give 4, one for each of joint1"),
+    ({"force_deadband": (LIMIT := 20.0,)}, "force_error_limit of x is 20; it must be above force_deadband, 20"),
+    ({"torque_error_limit": (5.0, 5.0, 0.0, 5.0)}, "torque_error_limit of joint3 is 0; it must be above"),
+])  # fmt: skip
 def test_laws_that_do_not_fit_are_refused_whole(change: dict[str, Any], text: str) -> None:
     loop = force_loop(ARM, OWN)
     with pytest.raises(ParameterError, match=text):

@@ -58,10 +58,9 @@ def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("q", "place", "newtons"),
-    [((0.0, -1.5, 0.0, 1.3), 0.4064, (10.0, 0.0, 0.0)), ((-0.34, -1.08, -2.46, 2.17), 0.4, (27.6, -7.9, 4.9))],
-)
+@pytest.mark.parametrize(("q", "place", "newtons"), [
+    ((0.0, -1.5, 0.0, 1.3), 0.4064, (10.0, 0.0, 0.0)), ((-0.34, -1.08, -2.46, 2.17), 0.4, (27.6, -7.9, 4.9)),
+])  # fmt: skip
 def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
     q: tuple[float, ...], place: float, newtons: tuple[float, ...]
 ) -> None:

@@ -131,10 +131,9 @@ def guard_of(configuration: Configuration) -> ServoGuard:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
-@pytest.mark.parametrize(
-    ("mode", "proportional", "integral"),
-    [("realtime", 8.0, 1.0), ("lockstep", 8.0, 1.0), ("lockstep", 1.0, 500.0), ("realtime", 1e6, 1e8)],
-)
+@pytest.mark.parametrize(("mode", "proportional", "integral"), [
+    ("realtime", 8.0, 1.0), ("lockstep", 8.0, 1.0), ("lockstep", 1.0, 500.0), ("realtime", 1e6, 1e8),
+])  # fmt: skip
 def test_a_refusal_names_gains_that_are_accepted(
     configuration: Configuration, mode: str, proportional: float, integral: float
 ) -> None:

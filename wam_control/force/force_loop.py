@@ -93,7 +93,7 @@ class ForceLoop:
     ) -> None:
         self._timing, self._servo, self._body = timing, servo, RigidBody(arm)
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
-        self._measurement = ForceMeasurement(self._body)
+        self._feedback = ""  # none so far
         self._pushed = PushedArm(self._body)
         zero = self._velocity = self._moved = np.zeros(len(arm.joints.names))
         self._pose = np.zeros(0)  # none so far
@@ -122,6 +122,8 @@ class ForceLoop:
         )
         self.supervision = Supervision(arm, self._servo, timing, parameters, tuple(self._pose.tolist()))
         self._axes = TaskAxes(self._body, ForceAxes(self._body, parameters.sensing_fed_back))
+        if parameters.feedback != self._feedback:  # what counts as zero is that of one signal
+            self._feedback, self._measurement = parameters.feedback, ForceMeasurement(self._body)
 
     @property
     def parameters(self) -> ForceLoopParameters:
@@ -193,7 +195,7 @@ class ForceLoop:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(pose)))
             self.events, self._velocity = (), np.array(joints.velocity)
             return ForceOutput([], effort.tolist(), frame=self._run.frame)
-        if given.rate and admitted.posture != given.posture:
+        if given.posture is None or admitted.posture != list(given.posture):
             given = given._replace(rate=None)
         found = self._watch(given) if self._run.axes else []
         if given.task is not None and (reason := beyond(given.task, own)):
@@ -271,20 +273,20 @@ class ForceLoop:
         for one in run.axes:
             one.known = self._knowledge.of(q, one.on_links)
             # a held arm has not left what it touched, also where that is not estimated any more
-            if one.of.position is None and one.touch.has_been and run.held_at is not None and not contact.cover:
+            if one.now.of.position is None and one.touch.has_been and run.held_at is not None and not contact.cover:
                 one.known = one.known._replace(errors=Errors(place=math.inf))
         run.move(self._moved, forces, q)
         found = [holding(Code.REFUSED, "moved_fast", speed=FORCE.slow)] if run.is_moving else []
         is_led = bool(given.rate) or not all(one.now.is_force for one in run.axes)
-        covers = {one.of.cover for one in run.axes if one.now.place}
+        covers = {one.now.of.cover for one in run.axes if one.now.place}
         probable = contact.probability >= own.link_probability_limit
         touched = contact.cover if covers and probable and not covers & {"", contact.cover} else ""
         for one in run.axes:
             axis, known = one.now, one.known
-            if not axis.desired:
-                continue
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
             one.touch.step(force, size, given.dt)
+            if not axis.desired:
+                continue
             way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(self._moved))
             is_touched = math.hypot(*contact.force) >= FORCE.touch * size
             seen = Seen(known, way, touched if is_touched else "", is_led)
@@ -315,6 +317,7 @@ class ForceLoop:
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
         rows = [] if holds or not axes else self._rows(is_watching, dt)
         if holds:
+            run.delayed = []
             if run.held_at is None:
                 run.held_at = self._hold_at(found, contact)
             # what it may hit on its way back after a push
@@ -537,7 +540,7 @@ def _task(
     """What is commanded as a task, and what makes it the same command as before, whatever its values are."""
     if task is not None:
         kept = (axis._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0) for axis in task.axes)
-        return task, (TaskCommand, task.frame, *kept)
+        return task, (TaskCommand, own.feedback, task.frame, *kept)
     if force is None or not any(force.force):
         return None, ()
     size = math.hypot(*force.force)
@@ -546,7 +549,7 @@ def _task(
     if not at[0] and own.contact_source == "pinned":
         at = own.contact_cover, own.contact_position
     axis = TaskAxis(AxisKind.FORCE, -1, *at, (x, y, z), size)
-    return TaskCommand(force.frame, (axis,)), (ForceCommand, force.frame)
+    return TaskCommand(force.frame, (axis,)), (ForceCommand, own.feedback, force.frame)
 
 
 def by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
