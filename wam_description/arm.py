@@ -57,12 +57,12 @@ class Covers:
         """Outer radius of the tube of this name, m."""
         return self.radius[self.names.index(name)]
 
-    def aside(self, name: str, place: float) -> tuple[float, float]:
-        """Offset of the tube's axis from the frame's x axis, y and z, m, at a contact position x, m."""
+    def on_axis(self, name: str, place: float) -> tuple[float, float, float]:
+        """Point of the tube's axis in the frame of the cover, m, at a contact position, m."""
         at = 3 * self.names.index(name)
         start, end = self.start[at : at + 3], self.end[at : at + 3]
         fraction = (place - start[0]) / (end[0] - start[0]) if end[0] != start[0] else 0.0
-        return start[1] + fraction * (end[1] - start[1]), start[2] + fraction * (end[2] - start[2])
+        return place, start[1] + fraction * (end[1] - start[1]), start[2] + fraction * (end[2] - start[2])
 
 
 def _point(point: Sequence[float]) -> str:

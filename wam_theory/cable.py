@@ -70,21 +70,6 @@ def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLi
     return half * (np.maximum(x + offset, 0.0) - np.maximum(offset - x, 0.0))
 
 
-def play_torque(stretch: ArrayLike, stiffness: ArrayLike, backlash: ArrayLike) -> Array:
-    """Torque of a geared shaft with backlash at its motor, N m: k (|x| - play/2) beyond half the play, section 2.2.
-
-    Parameters
-    ----------
-    stretch : theta_m minus the joints' angle at the motor, rad.
-    stiffness : k, N m/rad.
-    backlash : play, rad, zero or more.
-    """
-    (x,) = finite(stretch=stretch)
-    (k,) = above_zero(stiffness=stiffness)
-    (play,) = zero_or_more(backlash=backlash)
-    return np.asarray(np.sign(x) * k * np.maximum(np.abs(x) - 0.5 * play, 0.0))
-
-
 def slack_stretch(stiffness: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> Array:
     """Stretch at which the loose strand goes slack, x0 = 2 T0 r/k, rad.
 

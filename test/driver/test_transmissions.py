@@ -15,7 +15,7 @@ from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.figures.transmissions import EFFICIENCY, HEAVIER, KINDS, STIFFNESS, driven, measured, predicted
 from wam_studies.plant.ideal_testbed import ideal_testbed, released_plant
-from wam_theory.cable import circuit_torque, play_torque
+from wam_theory.cable import circuit_torque
 
 
 @pytest.mark.slow
@@ -51,10 +51,13 @@ def test_stack_presses_with_every_transmission(name: str) -> None:
 def test_torque_of_a_circuit_over_its_stretch_is_that_of_a_slack_strand_and_of_backlash() -> None:
     (circuit,), play = ideal_testbed().circuits, 0.04
     slack = partial(circuit_torque, stiffness=circuit.stiffness, pretension=circuit.pretension, radius=circuit.radius)
-    backlash = partial(play_torque, stiffness=circuit.stiffness, backlash=play)
     cases: list[tuple[dict[str, Any], float, Any]] = [
         ({"slack": True}, circuit.slack_stretch, slack),
-        ({"backlash": (play,)}, play, backlash),
+        (
+            {"backlash": (play,)},
+            play,
+            lambda x: circuit.stiffness * np.sign(x) * np.maximum(np.abs(x) - play / 2, 0.0),
+        ),
     ]
     for effects, scale, law in cases:
         plant, stretches, found = released_plant(ideal_testbed(), **effects), np.linspace(-2.5, 2.5, 101) * scale, []
