@@ -13,14 +13,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
+from wam_theory.velocity_servo import is_stable
 from wam_theory.zero_order_hold import zero_order_hold
-
-Array = NDArray[np.float64]
 
 
 class Feedback(NamedTuple):
@@ -78,7 +75,6 @@ class SampledLoop:
         self._n, self.tick, self.divisor = n, timing.period, timing.outer_divisor
         stiffness = np.array([circuit.stiffness for circuit in arm.circuits])
         damping = np.array([circuit.damping for circuit in arm.circuits])
-        self.joint_stiffness = self.motor_from_joint.T @ (stiffness[:, None] * self.motor_from_joint)
         zero, one = np.zeros((n, n)), np.eye(n)
         # states: theta, thetad, q, qd
         cable = np.hstack(
@@ -121,7 +117,7 @@ class SampledLoop:
         moving = period(1.0) - still
         below = 0.0
         for scale in scales:
-            if _grows(still + scale * moving):
+            if not is_stable(still + scale * moving):
                 break
             below = scale
         else:
@@ -129,10 +125,10 @@ class SampledLoop:
         above = scale
         while below and above > below * 1.002:
             middle = math.sqrt(below * above)
-            if _grows(still + middle * moving):
-                above = middle
-            else:
+            if is_stable(still + middle * moving):
                 below = middle
+            else:
+                above = middle
         return below
 
     def period(self, q: Sequence[float], axes: Axes, contact: Array, feedback: Feedback) -> Callable[[float], Array]:
@@ -184,8 +180,3 @@ class SampledLoop:
         elif feedback.kind == "joint_position":
             shown = np.hstack([np.zeros((n, 2 * n)), np.diag(feedback.spring), np.zeros((n, n))])
         return np.vstack([self._motor_rate, self._motor, self._joint_rate, qdd]), shown
-
-
-def _grows(period: Array) -> bool:
-    """Whether a mode of the map grows."""
-    return bool(np.abs(np.linalg.eigvals(period)).max() > 1.0 + GUARD.on_the_circle)

@@ -14,7 +14,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.force_axis import ForceAxes, ForceAxis, ForcePlace, SensingParameters
 from wam_control.force.force_law import ForceLaw
@@ -23,14 +22,15 @@ from wam_control.force.task import TaskAxis
 from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter
+from wam_description.rigid_body import Array
 from wam_description.signals import Triple
+from wam_description.transmission_map import TransmissionMap
 from wam_theory.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_theory.linear_loop import series_stiffness
 from wam_theory.rounding import rounded_down
 from wam_theory.stick_slip import FrictionNode
 from wam_theory.thresholds import DESIGN
 
-Array = NDArray[np.float64]
 ESTIMATE = "contact_estimate"
 SCALES: tuple[float, ...] = (GUARD.least_scale, *np.geomspace(0.01, GUARD.largest_scale, 19).tolist())
 
@@ -309,11 +309,11 @@ class StabilityGuard:
         def friction(values: Sequence[float]) -> float:
             return float(np.abs(reach) @ np.array(values)) / square
 
-        damping = np.array(joints.viscous_friction)
+        damping, cables = np.array(joints.viscous_friction), [circuit.stiffness for circuit in self.arm.circuits]
         return FrictionNode(
             inertia=along(inertia),
             damping=along(np.diag(damping)) if damping.all() else 0.0,
-            transmission_stiffness=along(loop.joint_stiffness),
+            transmission_stiffness=along(TransmissionMap.of(self.arm).at_joints(cables)),
             contact_stiffness=self.parameters.contact_stiffness,
             dynamic_friction=friction(joints.dynamic_friction),
             static_friction=friction(joints.static_friction),

@@ -70,7 +70,6 @@ class GuardThresholds:
     slack: float = 0.003  # the search for a margin ends within 0.2 %
     # N, of commands at which parameters are assessed: the sensed force depends on them
     forces: tuple[float, ...] = (1.0, 40.0)
-    on_the_circle: float = 1e-7  # growth of a mode in one period that counts as none
     # while the arm moves
     turn: float = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
     shift: float = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again
