@@ -39,21 +39,14 @@ class VelocityRow(NamedTuple):
         return length(self.along)
 
 
-class Solution(NamedTuple):
-    """Joint velocities (n,), rad/s, with and without the limits; the same object where no limit is active."""
-
-    velocity: Array
-    unlimited: Array
-
-
 def solve(
     rows: Sequence[VelocityRow],
     posture: Array,
     least: Sequence[VelocityRow],
     low: Sequence[float],
     high: Sequence[float],
-) -> Solution:
-    """The joint velocities of one period.
+) -> tuple[Array, Array]:
+    """The joint velocities of one period (n,), rad/s, with and without the limits; one object where none is active.
 
     Parameters
     ----------
@@ -67,8 +60,8 @@ def solve(
     each = zip(low, free.tolist(), high)  # noqa: B905 - as long as each other
     is_inside = all([slowest <= speed <= fastest for slowest, speed, fastest in each])  # noqa: C419 - a list takes half the time
     if is_inside and all(along.dot(free) >= speed for along, speed in least):
-        return Solution(free, free)
-    return Solution(_limited(rows, posture, least, np.array(low), np.array(high)), free)
+        return free, free
+    return _limited(rows, posture, least, np.array(low), np.array(high)), free
 
 
 def unlimited(rows: Sequence[VelocityRow], posture: Array) -> Array:
