@@ -68,7 +68,7 @@ def test_its_cost_is_below_half_a_percent_of_heat_and_a_few_millimetres() -> Non
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"dither.phase.*2 values; 4 motors need 4"):
+    with pytest.raises(ParameterError, match=r"dither.phase.*2 values; it needs 4"):
         Dither(WAM, TIMING, DitherParameters(1.0, (0.0, 0.0)))
     with pytest.raises(ParameterError, match=r"dither_cycle.*at least 4"):
         Dither(WAM, dataclasses.replace(TIMING, dither_cycle=2), PARAMETERS)

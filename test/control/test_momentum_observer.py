@@ -287,7 +287,7 @@ def test_motors_without_current_at_rest_give_no_estimate() -> None:
 
 def test_mass_scale_of_another_arm_is_refused() -> None:
     wrong: ObserverParameters = dataclasses.replace(NOMINAL, mass_scale=(1.0,))
-    with pytest.raises(ParameterError, match=r"mass_scale.*1 values; 4 links need 4"):
+    with pytest.raises(ParameterError, match=r"mass_scale.*1 values; it needs 4"):
         MomentumObserver(WAM, wrong, use_joint_sensors=False)
 
 

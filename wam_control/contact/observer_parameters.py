@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from wam_description.arm import Arm
-from wam_description.parameters import parameter, require
+from wam_description.parameters import lengths, parameter, require
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,4 @@ class ObserverParameters:
 
     def require_fit(self, arm: Arm) -> None:
         """Refuse factors that are not one for each link."""
-        n = len(arm.links.names)
-        require(
-            len(self.mass_scale) == n,
-            f"parameter 'observer.mass_scale' has {len(self.mass_scale)} values; {n} links need {n}",
-        )
+        lengths("observer", arm.links.names, {"mass_scale": self.mass_scale})

@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Timing
-from wam_description.parameters import parameter, require
+from wam_description.parameters import lengths, parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
@@ -31,8 +31,7 @@ class DitherParameters:
 
     def require_fit(self, arm: Arm) -> None:
         """Refuse phases that are not one for each motor."""
-        n = len(arm.motors.names)
-        require(len(self.phase) == n, f"parameter 'dither.phase' has {len(self.phase)} values; {n} motors need {n}")
+        lengths("dither", arm.motors.names, {"phase": self.phase})
 
 
 class DitherCost(NamedTuple):
