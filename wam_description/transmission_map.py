@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wam_description.arm import Arm
+from wam_description.small_matrices import Array
 
 
 class TransmissionMap:
@@ -34,8 +35,8 @@ class TransmissionMap:
         inverse = np.linalg.inv(forward) + 0.0  # turns -0.0 into 0.0
         forward.setflags(write=False)
         inverse.setflags(write=False)
-        self.joint_from_motor: NDArray[np.float64] = forward
-        self.motor_from_joint: NDArray[np.float64] = inverse
+        self.joint_from_motor: Array = forward
+        self.motor_from_joint: Array = inverse
         self._forward, self._inverse = _terms(forward), _terms(inverse)
         self._forward_transposed, self._inverse_transposed = _terms(forward.T), _terms(inverse.T)
 
@@ -68,10 +69,10 @@ class TransmissionMap:
         """Motor torques M^T tau, n, N m, of joint torques, n, N m (A.5, by power)."""
         return _product(self._forward_transposed, tau)
 
-    def at_joints(self, per_motor: Sequence[float]) -> NDArray[np.float64]:
+    def at_joints(self, per_motor: Sequence[float]) -> Array:
         """M^-T diag M^-1, (n, n): an inertia, a stiffness or a damping of each motor as the joints have it (A.5)."""
         inverse = self.motor_from_joint
-        result: NDArray[np.float64] = inverse.T @ (np.array(per_motor)[:, None] * inverse)
+        result: Array = inverse.T @ (np.array(per_motor)[:, None] * inverse)
         return result
 
     def largest_joint_torques(self, peak_torque: Sequence[float]) -> list[float]:
@@ -83,7 +84,7 @@ class TransmissionMap:
         return _product(_terms(np.abs(self.motor_from_joint)), speed_limit)
 
 
-def _terms(matrix: NDArray[np.float64]) -> list[list[tuple[int, float]]]:
+def _terms(matrix: Array) -> list[list[tuple[int, float]]]:
     return [[(j, factor) for j, factor in enumerate(row) if factor != 0.0] for row in matrix.tolist()]
 
 

@@ -5,15 +5,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_description.arm import Arm
 from wam_description.mjcf_objects import hinge_name
+from wam_description.rigid_body import Array
 from wam_description.signals import ObjectState
 from wam_description.world import World
 from wam_driver.loads import contact_force, sides
-
-Array = NDArray[np.float64]
 
 
 class MovingObstacle:

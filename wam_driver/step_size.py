@@ -12,16 +12,14 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.parameters import ParameterError, rows
+from wam_description.rigid_body import Array
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.thresholds import PLANT
-
-Array = NDArray[np.float64]
 
 
 class Linearised(NamedTuple):

@@ -3,16 +3,12 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.parameters import ParameterError
+from wam_description.rigid_body import Array
 from wam_description.world import World
 from wam_driver.thresholds import PLANT
-
-Array = NDArray[np.float64]
 
 WHOLE = [1.0]
 

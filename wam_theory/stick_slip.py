@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wam_theory.arguments import Array
 from wam_theory.friction_model import FrictionNode, IntegralLoop, require
 from wam_theory.half_cycle import HalfCycle, half_cycle
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
@@ -56,10 +57,10 @@ class PhaseEvent(NamedTuple):
 class Motion(NamedTuple):
     """Sampled trajectory: arrays of the shape of the times."""
 
-    x: NDArray[np.float64]
-    v: NDArray[np.float64]
-    x_m: NDArray[np.float64]
-    contact_force: NDArray[np.float64]
+    x: Array
+    v: Array
+    x_m: Array
+    contact_force: Array
 
 
 @dataclass(frozen=True, slots=True)

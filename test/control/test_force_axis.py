@@ -62,7 +62,7 @@ def test_the_stated_standard_deviation_is_that_of_the_sensed_force(q: tuple[floa
     random, n, direction = np.random.default_rng(6), 4000, lateral(q)
     axis = axis_of(q, direction, at=0.2, sd=0.02)
     rotation, radius = BODY.cover_pose(q, OUTER).rotation, WAM.covers.radius_of(OUTER)
-    point = np.array([0.2, *WAM.covers.aside(OUTER, 0.2)]) + radius * (rotation.T @ direction)
+    point = np.array(WAM.covers.on_axis(OUTER, 0.2)) + radius * (rotation.T @ direction)
     jacobian = BODY.point_jacobian(q, OUTER, point)
     slide = BODY.point_jacobian(q, OUTER, point + np.array([1.0, 0.0, 0.0])) - jacobian
     sideways = 10.0 * SENSING.friction * random.normal(size=(n, 3)) @ (np.eye(3) - np.outer(direction, direction))

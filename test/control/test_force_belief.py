@@ -82,7 +82,7 @@ def test_the_predicted_error_is_that_of_random_torques_friction_and_position(q: 
     for off, sideways, noise in zip(
         0.02 * random.normal(size=n), random.normal(size=(n, 3)), SD * random.normal(size=(n, 4)), strict=True
     ):
-        point = np.array([0.28 + off, *WAM.covers.aside(OUTER, 0.28)]) + radius * (rotation.T @ axis.direction)
+        point = np.array([0.28 + off, *WAM.covers.on_axis(OUTER, 0.28)[1:]]) + radius * (rotation.T @ axis.direction)
         force = 10.0 * axis.direction + 10.0 * PLAIN.sensing.friction * across @ sideways
         torques = noise - force @ BODY.point_jacobian(q, OUTER, point)
         found.append(axis.force(torques) - 10.0)

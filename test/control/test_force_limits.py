@@ -132,7 +132,7 @@ def test_the_link_that_is_pushed_is_the_one_that_explains_the_torques() -> None:
 
 def test_a_posture_slides_the_link_no_faster_than_the_force_follows() -> None:
     axis = axis_at(POSES[0], 5.0)
-    point = (0.28, *WAM.covers.aside(OUTER, 0.28))
+    point = WAM.covers.on_axis(OUTER, 0.28)
     for speed in (1e-3, 1.0):
         wanted = speed * np.array([1.0, 0.5, -0.5, 1.0])
         found = followed(wanted, axis, BODY, POSES[0], OWN)

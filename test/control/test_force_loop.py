@@ -61,7 +61,7 @@ def limited(**limits: Any) -> ForceLoopParameters:
 
 def lever(q: list[float], n: Any = DOWN, cover: str = COVER, place: float = PLACE) -> np.ndarray:
     """Joint torques per newton along n at a point, from finite differences of where the point is."""
-    point, h = (place, *ARM.covers.aside(cover, place)), 1e-6 * np.eye(4)
+    point, h = ARM.covers.on_axis(cover, place), 1e-6 * np.eye(4)
     columns = [(BODY.point(q + d, cover, point) - BODY.point(q - d, cover, point)) / 2e-6 for d in h]
     return np.array(columns) @ np.array(n)
 

@@ -27,7 +27,7 @@ OWN = replace(
     sensing=replace(PACKAGED.sensing, zero_limit=0.0),
 )
 HOLDS = replace(OWN, limits=replace(OWN.limits, doubt=0.01))  # nothing is known well enough
-MIDDLE = (0.28, *ARM.covers.aside("outer_link", 0.28))
+MIDDLE = ARM.covers.on_axis("outer_link", 0.28)
 UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -264,7 +264,7 @@ IN_LINK = WAM.covers.names[0]  # a post and a ball are put on its axis
 def on_the_axis(share: float = 0.5) -> np.ndarray:
     """Point of the first cover's axis at the start pose, (3,), m, base frame."""
     length = WAM.covers.length[0]
-    return RigidBody(WAM).point(WAM.joints.start, IN_LINK, (share * length, *WAM.covers.aside(IN_LINK, share * length)))
+    return RigidBody(WAM).point(WAM.joints.start, IN_LINK, WAM.covers.on_axis(IN_LINK, share * length))
 
 
 def one_obstacle(shape: str, position: np.ndarray, sizes: tuple[float, ...]) -> Obstacles:

@@ -50,19 +50,16 @@ def test_every_frame_is_read_by_the_independent_decoder() -> None:
     assert differing == 0
 
 
-@pytest.mark.parametrize(
-    ("frame", "identifier", "data"),
-    [
-        (frames.get(3, 5), 0x003, "05"),
-        (frames.get(BusGroup.MOTORS, 48), 0x404, "30"),
-        (frames.put(10, 8, 1), 0x00A, "880001000000"),
-        (frames.put(BusGroup.MOTORS, 8, 2), 0x404, "880002000000"),
-        (frames.reply(10, 8, 2), 0x546, "880002000000"),
-        (frames.position(2, -1), 0x443, "3fffff"),
-        (frames.torques(BusGroup.WRIST, 42, [1]), 0x402, "aa00040000000000"),
-        (frames.torques(BusGroup.ARM, 42, [1, -1, 8191, -8191]), 0x401, "aa0007fff7ffe001"),  # published
-    ],
-)
+@pytest.mark.parametrize(("frame", "identifier", "data"), [
+    (frames.get(3, 5), 0x003, "05"),
+    (frames.get(BusGroup.MOTORS, 48), 0x404, "30"),
+    (frames.put(10, 8, 1), 0x00A, "880001000000"),
+    (frames.put(BusGroup.MOTORS, 8, 2), 0x404, "880002000000"),
+    (frames.reply(10, 8, 2), 0x546, "880002000000"),
+    (frames.position(2, -1), 0x443, "3fffff"),
+    (frames.torques(BusGroup.WRIST, 42, [1]), 0x402, "aa00040000000000"),
+    (frames.torques(BusGroup.ARM, 42, [1, -1, 8191, -8191]), 0x401, "aa0007fff7ffe001"),  # published
+])  # fmt: skip
 def test_frames_have_the_identifiers_of_the_bus(frame: Frame, identifier: int, data: str) -> None:
     assert (frame.identifier, frame.data.hex()) == (identifier, data)
 
@@ -73,22 +70,19 @@ def test_short_replies_keep_their_sign_and_other_frames_are_none() -> None:
         assert frames.read(other) is None
 
 
-@pytest.mark.parametrize(
-    ("name", "is_safety", "numbers"),
-    [
-        ("T", False, {32: 10, 49: 10, 50: 9, 60: 9, 61: 42, 200: 42}),
-        ("P", False, {32: 26, 61: 48, 64: 48, 65: 48}),
-        ("V", False, {50: 10, 61: 44, 113: 44, 114: 106, 118: 106, 119: 44}),
-        ("CTS", False, {60: 30, 61: 65, 63: 65, 64: 66, 65: 68}),
-        ("IPNM", False, {32: 108, 33: 57, 35: 57, 36: 108, 61: 83, 64: 83, 65: 86}),
-        ("ECMIN", False, {44: 114, 61: 92, 65: 97, 124: 97, 125: 101, 131: 101, 132: 102}),
-        ("POLES", False, {44: 112, 61: 87, 65: 90}),
-        ("MODE", False, {32: 8, 200: 8}),
-        ("DEF", True, {60: 89, 61: 32}),
-        ("ZERO", True, {36: 55, 60: 55, 61: 42}),
-        ("IFAULT", True, {60: 100, 61: 55}),
-    ],
-)
+@pytest.mark.parametrize(("name", "is_safety", "numbers"), [
+    ("T", False, {32: 10, 49: 10, 50: 9, 60: 9, 61: 42, 200: 42}),
+    ("P", False, {32: 26, 61: 48, 64: 48, 65: 48}),
+    ("V", False, {50: 10, 61: 44, 113: 44, 114: 106, 118: 106, 119: 44}),
+    ("CTS", False, {60: 30, 61: 65, 63: 65, 64: 66, 65: 68}),
+    ("IPNM", False, {32: 108, 33: 57, 35: 57, 36: 108, 61: 83, 64: 83, 65: 86}),
+    ("ECMIN", False, {44: 114, 61: 92, 65: 97, 124: 97, 125: 101, 131: 101, 132: 102}),
+    ("POLES", False, {44: 112, 61: 87, 65: 90}),
+    ("MODE", False, {32: 8, 200: 8}),
+    ("DEF", True, {60: 89, 61: 32}),
+    ("ZERO", True, {36: 55, 60: 55, 61: 42}),
+    ("IFAULT", True, {60: 100, 61: 55}),
+])  # fmt: skip
 def test_properties_have_the_number_of_the_firmware(name: str, is_safety: bool, numbers: dict[int, int]) -> None:
     assert {version: properties.numbers(version, is_safety)[name] for version in numbers} == numbers
 

@@ -180,14 +180,11 @@ SPIN = (6.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize(
-    ("limit", "joints", "parameters", "fault"),
-    [
-        (1.0, {"speed_limit": (1.0, 1e6, 1e6, 1e6)}, NO_LIMITS, "speed of joint1"),
-        (0.8, FAST_JOINTS, NO_LIMITS | {"tip_speed_limit": 0.8}, "speed of the tip"),
-        (0.4, FAST_JOINTS, NO_LIMITS | {"cover_speed_limit": 0.4}, "speed of outer_link at the end nearer the base"),
-    ],
-)
+@pytest.mark.parametrize(("limit", "joints", "parameters", "fault"), [
+    (1.0, {"speed_limit": (1.0, 1e6, 1e6, 1e6)}, NO_LIMITS, "speed of joint1"),
+    (0.8, FAST_JOINTS, NO_LIMITS | {"tip_speed_limit": 0.8}, "speed of the tip"),
+    (0.4, FAST_JOINTS, NO_LIMITS | {"cover_speed_limit": 0.4}, "speed of outer_link at the end nearer the base"),
+])  # fmt: skip
 def test_too_fast_is_a_fault_and_nearly_too_fast_a_warning(
     limit: float, joints: dict[str, tuple[float, ...]], parameters: dict[str, float], fault: str, direction: float
 ) -> None:
@@ -432,17 +429,14 @@ def test_wrong_number_of_values_is_refused_with_a_name(prefix: str, field: Field
         assert re.search(" needs? ", str(refusal.value))
 
 
-@pytest.mark.parametrize(
-    ("key", "message"),
-    [
-        (
-            "driver:effects.ripples.shafts",
-            "effects.ripples.shafts names 'motor9'; motors and joints: motor1, .* joint4",
-        ),
-        ("driver:world.springs.joints", "world.springs.joints names 'motor9'; joints: joint1, joint2, joint3, joint4"),
-        ("arm.cables.stage_motors", "arm.cables.stage_motors names 'motor9'; motors: motor1, motor2, motor3, motor4"),
-    ],
-)
+@pytest.mark.parametrize(("key", "message"), [
+    (
+        "driver:effects.ripples.shafts",
+        "effects.ripples.shafts names 'motor9'; motors and joints: motor1, .* joint4",
+    ),
+    ("driver:world.springs.joints", "world.springs.joints names 'motor9'; joints: joint1, joint2, joint3, joint4"),
+    ("arm.cables.stage_motors", "arm.cables.stage_motors names 'motor9'; motors: motor1, motor2, motor3, motor4"),
+])  # fmt: skip
 def test_shaft_that_the_arm_does_not_have_is_refused_with_those_it_has(key: str, message: str) -> None:
     node, _, name = key.rpartition(":")
     values = list(CONFIGURATION.sections[node or "/**"][name])
@@ -519,15 +513,12 @@ def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
     assert hardware.safety.mode is Mode.BRAKED
 
 
-@pytest.mark.parametrize(
-    ("q", "qd"),
-    [
-        ([0.0, -0.6, 0.0, 0.5], [0.0, 4.0, 0.0, 0.0]),
-        ([0.07, 2.03, -1.79, 2.15], [-4.0, 0.0, 6.0, -6.0]),
-        ([-2.08, 1.44, 0.92, 1.53], [2.6, -2.6, 3.9, 3.9]),
-        ([2.73, 1.01, 0.21, -0.41], [4.0, -2.0, -6.0, 6.0]),
-    ],
-)
+@pytest.mark.parametrize(("q", "qd"), [
+    ([0.0, -0.6, 0.0, 0.5], [0.0, 4.0, 0.0, 0.0]),
+    ([0.07, 2.03, -1.79, 2.15], [-4.0, 0.0, 6.0, -6.0]),
+    ([-2.08, 1.44, 0.92, 1.53], [2.6, -2.6, 3.9, 3.9]),
+    ([2.73, 1.01, 0.21, -0.41], [4.0, -2.0, -6.0, 6.0]),
+])  # fmt: skip
 def test_brakes_stop_an_arm_at_its_speed_limits_within_a_tenth_of_a_radian_and_break_no_cable(
     q: list[float], qd: list[float]
 ) -> None:

@@ -275,15 +275,12 @@ def shaft_torque(plant: Plant, dof: int, inertia: float, angles: np.ndarray) -> 
     return np.array(found)
 
 
-@pytest.mark.parametrize(
-    ("shaft", "dof", "inertia", "ratio", "cycles"),
-    [
-        ("motor1", 0, ROTOR, 1.0, 24),  # cogging
-        ("motor1", 0, ROTOR, 0.2586, 1),  # an eccentric pulley geared down from the motor, 0.75 in on 2.9 in
-        ("joint1", 1, LINK_INERTIA, 1.0, 1),  # the driven pulley itself
-        ("joint1", 1, LINK_INERTIA, -3.867, 2),  # one that turns the other way, faster than the joint
-    ],
-)
+@pytest.mark.parametrize(("shaft", "dof", "inertia", "ratio", "cycles"), [
+    ("motor1", 0, ROTOR, 1.0, 24),  # cogging
+    ("motor1", 0, ROTOR, 0.2586, 1),  # an eccentric pulley geared down from the motor, 0.75 in on 2.9 in
+    ("joint1", 1, LINK_INERTIA, 1.0, 1),  # the driven pulley itself
+    ("joint1", 1, LINK_INERTIA, -3.867, 2),  # one that turns the other way, faster than the joint
+])  # fmt: skip
 def test_ripple_of_a_pulley_has_its_amplitude_its_cycles_and_its_phase(
     shaft: str, dof: int, inertia: float, ratio: float, cycles: int
 ) -> None:

@@ -114,14 +114,11 @@ def test_a_hand_that_turns_round_the_link_twists_it() -> None:
     assert abs(load.moment[0]) == pytest.approx(0.4 * 8.0 * (WAM.covers.radius[1] - 0.002), rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"end": 0.06}, "hand: world.pushers.end is 0.06 s"),
-        ({"sizes": (0.0, 0.0, 0.0)}, "hand: world.pushers.sizes of a sphere"),
-        ({"names": ""}, "give each a name of its own"),
-    ],
-)
+@pytest.mark.parametrize(("values", "message"), [
+    ({"end": 0.06}, "hand: world.pushers.end is 0.06 s"),
+    ({"sizes": (0.0, 0.0, 0.0)}, "hand: world.pushers.sizes of a sphere"),
+    ({"names": ""}, "give each a name of its own"),
+])  # fmt: skip
 def test_hands_that_cannot_be_are_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         hand(**values)

@@ -16,20 +16,17 @@ def in_mode(mode: Mode) -> Safety:
     return safety
 
 
-@pytest.mark.parametrize(
-    ("mode", "request_name", "after", "success"),
-    [
-        (Mode.BRAKED, "enable", Mode.ENABLED, True),
-        (Mode.ENABLED, "enable", Mode.ENABLED, True),
-        (Mode.FAULT, "enable", Mode.FAULT, False),
-        (Mode.BRAKED, "disable", Mode.BRAKED, True),
-        (Mode.ENABLED, "disable", Mode.BRAKED, True),
-        (Mode.FAULT, "disable", Mode.FAULT, True),
-        (Mode.BRAKED, "reset_fault", Mode.BRAKED, True),
-        (Mode.ENABLED, "reset_fault", Mode.ENABLED, True),
-        (Mode.FAULT, "reset_fault", Mode.BRAKED, True),
-    ],
-)
+@pytest.mark.parametrize(("mode", "request_name", "after", "success"), [
+    (Mode.BRAKED, "enable", Mode.ENABLED, True),
+    (Mode.ENABLED, "enable", Mode.ENABLED, True),
+    (Mode.FAULT, "enable", Mode.FAULT, False),
+    (Mode.BRAKED, "disable", Mode.BRAKED, True),
+    (Mode.ENABLED, "disable", Mode.BRAKED, True),
+    (Mode.FAULT, "disable", Mode.FAULT, True),
+    (Mode.BRAKED, "reset_fault", Mode.BRAKED, True),
+    (Mode.ENABLED, "reset_fault", Mode.ENABLED, True),
+    (Mode.FAULT, "reset_fault", Mode.BRAKED, True),
+])  # fmt: skip
 def test_request_leads_where_it_should(mode: Mode, request_name: str, after: Mode, success: bool) -> None:
     safety = in_mode(mode)
     answer = getattr(safety, request_name)(*([""] if request_name == "enable" else []))

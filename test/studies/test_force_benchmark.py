@@ -78,7 +78,7 @@ def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
     for task in DRAWN[:12]:
         configuration = configured(CONFIGURATION, task)
         surface = task.surface
-        point = (surface.position, *WAM.covers.aside(surface.cover, surface.position))
+        point = WAM.covers.on_axis(surface.cover, surface.position)
         lever = np.array(surface.direction) @ body.point_jacobian(task.q, surface.cover, point)
         for distance, touches in ((0.001, False), (0.003, True)):
             q = np.array(task.q) + lever * distance / float(lever @ lever)

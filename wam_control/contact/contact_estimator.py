@@ -4,9 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_control.contact.contact_inference import NO_HYPOTHESIS, ContactInference, Hypothesis, detection_statistic
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.model_errors import TrackedError
@@ -19,10 +16,9 @@ from wam_description.event import Event
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
 from wam_description.reasons import NO_REASON, Reason
+from wam_description.rigid_body import Array
 from wam_description.signals import State
 from wam_description.small_matrices import inverse
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,12 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
+from wam_description.rigid_body import Array
+from wam_description.signals import Triple
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
-Triple = tuple[float, float, float]
 Gram = list[list[float]]
 TWIST, AXIAL = 5, 6  # among the columns of Z
 # a piece of a link: log of the probability density of a contact, per metre; position and width, m; link; whether it is

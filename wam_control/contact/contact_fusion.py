@@ -27,13 +27,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.thresholds import CONTACT
 from wam_control.thresholds import MOTION
+from wam_description.rigid_body import Array
 from wam_description.small_matrices import inverse, solution
-
-Array = NDArray[np.float64]
 
 UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
 

@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence_of_weight
 from wam_control.contact.contact_fusion import ContactFusion, Torques
@@ -18,13 +18,10 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.parameters import require, rows
 from wam_description.reasons import NO_REASON, Reason
-from wam_description.rigid_body import RigidBody
-from wam_description.signals import ZERO
+from wam_description.rigid_body import Array, RigidBody
+from wam_description.signals import ZERO, Triple
 from wam_description.small_matrices import cross, inverse
 from wam_description.units import STANDARD_GRAVITY
-
-Array = NDArray[np.float64]
-Triple = tuple[float, float, float]
 
 
 class Hypothesis(NamedTuple):

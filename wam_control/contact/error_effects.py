@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.model_errors import Observation
 from wam_control.contact.motor_side import MotorSide
@@ -12,9 +11,7 @@ from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import DISTANCE_VARIANCE, DISTANCE_WEIGHTS, EQUAL, LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
-from wam_description.rigid_body import RigidBody, point_mass
-
-Array = NDArray[np.float64]
+from wam_description.rigid_body import Array, RigidBody, point_mass
 
 
 class FilteredMotion(NamedTuple):

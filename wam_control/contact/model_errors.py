@@ -14,13 +14,11 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.model_prior import ModelPrior
 from wam_control.contact.thresholds import CONTACT
+from wam_description.rigid_body import Array
 from wam_description.small_matrices import solution
-
-Array = NDArray[np.float64]
 
 
 class Observation(NamedTuple):

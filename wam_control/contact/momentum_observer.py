@@ -9,7 +9,6 @@ from operator import add, sub
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import ErrorEffects, FilteredMotion, GaugeEffects, LinkEffects
@@ -22,10 +21,9 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.event import Code, Event, warning
 from wam_description.model import ArmModel
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import State
 
-Array = NDArray[np.float64]
 NO_SIGNALS: Final = np.zeros(0)
 
 

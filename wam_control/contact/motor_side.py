@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import ShaftFriction
@@ -12,11 +11,10 @@ from wam_control.contact.thresholds import CONTACT
 from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
+from wam_description.rigid_body import Array
 from wam_description.signals import State
 from wam_description.small_matrices import solution
 from wam_description.transmission_map import TransmissionMap
-
-Array = NDArray[np.float64]
 
 
 class JointSample(NamedTuple):

@@ -4,14 +4,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
-
-Array = NDArray[np.float64]
+from wam_description.rigid_body import Array
 
 # one of each equal part of a distribution that is uniform in the logarithm; shortest first
 LOG_DISTANCES = np.log(CONTACT.shortest_presliding) + math.log(

@@ -124,7 +124,7 @@ class TaskAxes:
         if axis.joint >= 0:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
             return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, float(q[axis.joint]))
-        point = np.array([place.position, *self.forces.covers.aside(place.cover, place.position)])
+        point = np.array(self.forces.covers.on_axis(place.cover, place.position))
         at = float(direction.dot(self._body.point(q, place.cover, point)))
         if not axis.is_sensed:
             jacobian = self._body.point_jacobian(q, place.cover, point)

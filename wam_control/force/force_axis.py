@@ -246,14 +246,14 @@ class ForceAxes:
 
     def slide(self, q: Angles, cover: str, position: float, moved: Array) -> float:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
-        point = (position, *self.covers.aside(cover, position))
+        point = self.covers.on_axis(cover, position)
         along = self.link_axis(q, cover)
         return float(along.dot(self._body.point_jacobian(q, cover, point)) @ moved)
 
     def _jacobian(self, q: Angles, cover: str, position: float, normal: Array) -> tuple[Array, Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, the point, and the axis."""
         covers, rotation = self.covers, self._body.cover_pose(q, cover).rotation
-        point = np.array([position, *covers.aside(cover, position)])
+        point = np.array(covers.on_axis(cover, position))
         point += covers.radius_of(cover) * rotation.T.dot(normal)
         return self._body.point_jacobian(q, cover, point), point, rotation[:, 0]
 

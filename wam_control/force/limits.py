@@ -157,7 +157,7 @@ def followed(posture: Array, axis: CommandedAxis, body: RigidBody, q: Angles, ow
     """
     assert axis.place is not None
     assert axis.sensed is not None
-    point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
+    point = body.arm.covers.on_axis(axis.place.cover, axis.place.position)
     slide = FORCE.slide_slope * length(body.point_jacobian(q, axis.place.cover, point).dot(posture))
     pace = min(max(own.force_gain), yielding(axis.sensed, own) / own.latency)
     most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)

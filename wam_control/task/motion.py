@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, MotionParameters
 from wam_description.parameters import require
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import PathPoint, PosturePath, Triple
 
-Array = NDArray[np.float64]
 FASTEST = 15.0 / 8.0  # speed in the middle of a minimum-jerk path, of its mean
 UNITS = ("rad/s", "rad/s^2", "rad/s^3")  # of the derivatives of a joint angle
 

@@ -84,7 +84,7 @@ class Push(NamedTuple):
 
     def torque(self, covers: Covers | None) -> Triple:
         """About the origin of the cover, N m; where no covers are known, the tube's axis is the x axis of its frame."""
-        x, (y, z) = self.position, covers.aside(self.cover, self.position) if covers else (0.0, 0.0)
+        x, y, z = covers.on_axis(self.cover, self.position) if covers else (self.position, 0.0, 0.0)
         fx, fy, fz = self.force
         return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 

@@ -11,17 +11,15 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.sampled_loop import Feedback, SampledLoop
 from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import ParameterError, parameter, require
+from wam_description.rigid_body import Array
 from wam_description.transmission_map import TransmissionMap
 from wam_theory.rounding import rounded_down, rounded_up
 from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def of_kind(found: Contacts, kind: str) -> list[ContactOutcome]:
 def outer_covers(arm: Arm) -> tuple[str, ...]:
     """The covers along which a position can be measured: not all joint axes meet at their start."""
     body, covers = RigidBody(arm), arm.covers
-    found = (name for name in covers.names if body.moves(name, (0.0, *covers.aside(name, 0.0))))
+    found = (name for name in covers.names if body.moves(name, covers.on_axis(name, 0.0)))
     return tuple(found) or covers.names[-1:]
 
 

@@ -129,7 +129,7 @@ class Touch(NamedTuple):
     def wrench(self, time: float, covers: Covers) -> np.ndarray:
         """Force, N, and moment about the origin of the cover, N m, (6,)."""
         share, place = self.share(time), self.place_at(time)
-        force, axis = share * np.array(self.force), (place, *covers.aside(self.cover, place))
+        force, axis = share * np.array(self.force), covers.on_axis(self.cover, place)
         twist = np.array((share * self.twist, 0.0, 0.0))
         return np.concatenate((force, np.cross(np.add(axis, self.arm), force) + twist))
 

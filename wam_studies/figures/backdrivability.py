@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panel, Panels, line_only
@@ -50,7 +49,7 @@ class Backdriving:
         directions = np.random.default_rng(CASE.backdriven_seed).normal(size=(CASE.backdriven_directions, 3))
         self._directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
-    def mobility(self, q: tuple[float, ...], payload: float, rotors: bool = True) -> NDArray[np.float64]:
+    def mobility(self, q: tuple[float, ...], payload: float, rotors: bool = True) -> Array:
         """Acceleration of the tip over a force on it, (3, 3), 1/kg: W (1 + m W)^-1 with W = J M^-1 J^T.
 
         Parameters
@@ -62,17 +61,15 @@ class Backdriving:
         jacobian = self._body.tool_jacobian(q)
         inertia = self._body.mass_matrix(q) + self._armature + (self.rotors if rotors else 0.0)
         free = jacobian @ np.linalg.solve(inertia, jacobian.T)
-        found: NDArray[np.float64] = np.asarray(np.linalg.solve(np.eye(3) + payload * free, free), dtype=np.float64)
+        found: Array = np.asarray(np.linalg.solve(np.eye(3) + payload * free, free), dtype=np.float64)
         return found
 
-    def masses(
-        self, q: tuple[float, ...], directions: NDArray[np.float64], payload: float = 0.0, rotors: bool = True
-    ) -> NDArray[np.float64]:
+    def masses(self, q: tuple[float, ...], directions: Array, payload: float = 0.0, rotors: bool = True) -> Array:
         """Effective mass, (d,), kg, of the tip along each direction, (d, 3), in a pose q, rad, with a payload, kg."""
         along = np.einsum("di,ij,dj->d", directions, self.mobility(q, payload, rotors), directions)
         return np.asarray(1.0 / along, dtype=np.float64)
 
-    def pushes(self, q: tuple[float, ...], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pushes(self, q: tuple[float, ...], directions: Array) -> Array:
         """Greatest push along each direction, (d, 3), that moves no joint, each held by its own friction only, N."""
         levers = np.maximum(np.abs(directions @ self._body.tool_jacobian(q)), 1e-12)
         return np.asarray((self.friction / levers).min(axis=1), dtype=np.float64)

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_description.rigid_body import Array, RigidBody
-
-Triple = tuple[float, float, float]
+from wam_description.signals import Triple
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
     centre, axis, into = position(body, q, surface), rotation(body, q, surface)[:, 2], np.array(surface.direction)
     for name, radius, length in zip(covers.names, covers.radius, covers.length, strict=True):
         for place in np.linspace(0.0, length, SHAPE.points):
-            apart = centre - body.point(q, name, (place, *covers.aside(name, place)))
+            apart = centre - body.point(q, name, covers.on_axis(name, place))
             if surface.is_plane:
                 distance = float(apart @ into)
             else:
@@ -93,7 +92,7 @@ def position(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
     """A point of the plane, or the centre of the rod, (3,), m, base frame."""
     covers = body.arm.covers
     radius = covers.radius_of(surface.cover)
-    point = body.point(q, surface.cover, (surface.position, *covers.aside(surface.cover, surface.position)))
+    point = body.point(q, surface.cover, covers.on_axis(surface.cover, surface.position))
     return point + (radius + SHAPE.gap + (0.0 if surface.is_plane else SHAPE.rod[0])) * np.array(surface.direction)
 
 

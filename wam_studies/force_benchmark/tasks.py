@@ -16,8 +16,8 @@ from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import ForceCommand
-from wam_studies.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
+from wam_description.signals import ForceCommand, Triple
+from wam_studies.force_benchmark.surfaces import Surface, is_clear, obstacles
 from wam_studies.identification.plants import drawn_cover, factors, mismatch
 
 Range = tuple[float, float]

@@ -159,7 +159,7 @@ class TaskWatch:
         """Position of each touched point along its force, m."""
         covers, found = self._arm.covers, []
         for (surface, _), direction in zip(self._task.forces, self._directions, strict=True):
-            point = (surface.position, *covers.aside(surface.cover, surface.position))
+            point = covers.on_axis(surface.cover, surface.position)
             found.append(float(direction @ self._body.point(q, surface.cover, point)))
         return np.array(found)
 
@@ -193,7 +193,7 @@ def knowable(base: Configuration, task: Task) -> float:
     sd = sensing.estimated_torque_sd if task.is_dithered else max(task.strain_noise, 0.005)
     body, u = RigidBody(arm), np.array(surface.direction)
     here, there = (
-        body.point_jacobian(task.q, surface.cover, (surface.position + by, *arm.covers.aside(surface.cover, 0.0)))
+        body.point_jacobian(task.q, surface.cover, (surface.position + by, *arm.covers.on_axis(surface.cover, 0.0)[1:]))
         for by in (0.0, 1.0)
     )
     lever, shift = u @ here, u @ (there - here)

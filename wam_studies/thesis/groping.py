@@ -58,7 +58,7 @@ def touched(run: Recording, step: Step) -> Numbers:
         raise BagError(f"{run.bag.path}: no contact is estimated {BOUNDS.position_known_after} s after '{step.name}'")
     i = arm.covers.names.index(cover)
     inwards = np.array([0.0, push[1], push[2]]) / np.hypot(push[1], push[2])
-    axis = np.array([place, *arm.covers.aside(cover, place)])
+    axis = np.array(arm.covers.on_axis(cover, place))
     point: Numbers = RigidBody(arm).point(q, cover, axis - arm.covers.radius[i] * inwards)
     return point
 
