@@ -267,7 +267,7 @@ class Watch:
 
 
 def _differs(one: GuardedForces, other: GuardedForces) -> bool:
-    """Whether forces have other contacts, gains or axes beside them."""
+    """Whether forces have other contacts, gains or other axes with them."""
     if len(one.contacts) != len(other.contacts) or any(map(_is_apart, one.contacts, other.contacts)):
         return True
     return one.others != other.others or any(
