@@ -688,9 +688,9 @@ def test_a_step_made_in_python_sets_the_parameters_of_a_controller_that_takes_th
 @pytest.mark.parametrize(("more", "chirp", "text"), [
     ({}, 0.0, "step 'press': 70 N is commanded; allowed: up to force_limit, 60 N; command less, or raise force_loop:"),
     ({}, 20.0, "90 N is commanded; allowed"),
-    ({"torque": [0.0, 0.0, 0.0, 99.0]}, 0.0, "step 'set': 99 N m is commanded; allowed: up to torque_limit, 40 N m"),
+    ({"torque": [0.0, 0.0, 0.0, 99.0]}, 0.0, "torque of joint 4: 99 N m is commanded; allowed: up to torque_limit, 40"),
     ({"task": {"axes": [{"force": 61.0, "cover": "outer_link", "along": [0, 0, 1], "contact_position": 0.3}]}}, 0.0,
-     "step 'set': 61 N is commanded"),
+     "'set': force along .*: 61 N is commanded"),
     ({"set": {"force_loop": {"force_limit": 69.0}}}, 0.0, "70 N is commanded; allowed: up to force_limit, 69 N"),
     ({"set": {"force_loop": {"force_limit": 70.0}}}, 0.0, ""),
 ])  # fmt: skip

@@ -492,14 +492,17 @@ def _require_forces(where: str, steps: Sequence[ScenarioStep], limits: dict[str,
     """Refuse forces and torques that the force loop would refuse in each pose; `limits` are those at the start."""
     for step in steps:
         limits = {name: _set_to(step, name, limit) for name, limit in limits.items()}
-        commanded = [("force_limit", math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0))]
-        forces = [axis for axis in (step.task.axes if step.task else ()) if axis.kind is AxisKind.FORCE]
-        commanded += [("torque_limit" if axis.joint >= 0 else "force_limit", abs(axis.value or 0.0)) for axis in forces]
-        for name, size in commanded:
+        largest = math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0)
+        commanded = [("", "force_limit", largest)]
+        for axis in step.task.axes if step.task else ():
+            if axis.kind is AxisKind.FORCE:
+                name = "torque_limit" if axis.joint >= 0 else "force_limit"
+                commanded.append((f"{axis.name}: ", name, abs(axis.value or 0.0)))
+        for what, name, size in commanded:
             limit, unit = limits[name], LARGEST[name]
             require(
                 size <= limit,
-                f"{where}, step '{step.name}': {size:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} "
+                f"{where}, step '{step.name}': {what}{size:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} "
                 f"{unit}; command less, or raise {FORCE_LOOP}:{name}",
             )
 
