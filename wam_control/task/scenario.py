@@ -286,7 +286,7 @@ class Scenario:
 def _between(before: ForceCommand, force: ForceCommand, share: float) -> ForceCommand:
     """A share of the way from one force to another, and from one place to another; in another frame the first is none.
 
-    Where only one has a place, it counts, or does not, from the beginning.
+    Where only one has a place, that of the new one counts, or none.
     """
     start = before if before.frame == force.frame else NO_FORCE
     x, y, z = (a + share * (b - a) for a, b in zip(start.force, force.force, strict=True))

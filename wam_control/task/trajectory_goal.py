@@ -83,10 +83,12 @@ class TrajectoryPlayer:
         if trajectory is None or self.refusal:
             return None
         if self.motion is None:
-            self._waited += dt
             self._velocities.append(qd)
+            if len(self._velocities) != self._velocities.maxlen:
+                return None
             speed = max(abs(fmean(each)) for each in zip(*self._velocities, strict=True))
-            if speed > MOTION.at_rest or len(self._velocities) != self._velocities.maxlen:
+            if speed > MOTION.at_rest:
+                self._waited += dt
                 if self._waited > MOTION.goal_time:
                     allowed = f"a trajectory begins at rest, below {MOTION.at_rest:g} rad/s"
                     self.refusal = f"a joint moves at {speed:.3g} rad/s; {allowed}; stop the arm, then send it again"
