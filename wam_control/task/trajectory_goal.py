@@ -80,7 +80,7 @@ class TrajectoryPlayer:
             self.trajectory, self.motion, self.time, self.refusal = trajectory, None, 0.0, ""
             self._waited = 0.0
             self._velocities.clear()
-        if trajectory is None or self.refusal:
+        if trajectory is None or (self.refusal and not self._waited):
             return None
         if self.motion is None:
             self._velocities.append(qd)
@@ -91,8 +91,9 @@ class TrajectoryPlayer:
                 self._waited += dt
                 if self._waited > MOTION.goal_time:
                     allowed = f"a trajectory begins at rest, below {MOTION.at_rest:g} rad/s"
-                    self.refusal = f"a joint moves at {speed:.3g} rad/s; {allowed}; stop the arm, then send it again"
+                    self.refusal = f"a joint moves at {speed:.3g} rad/s; {allowed}; stop the arm"
                 return None
+            self._waited, self.refusal = 0.0, ""
             try:
                 self.motion = PostureMotion(q, trajectory, self._arm, self._limits)
             except ParameterError as error:
