@@ -106,6 +106,10 @@ class Arm:
         self.circuits  # noqa: B018 - refuses stages that make no circuit
         for link in self.covers.links:
             require(link in links, f"arm.covers.links names '{link}'; links: {', '.join(links)}")
+        require(
+            list(self.covers.links) == sorted(self.covers.links, key=links.index),
+            f"arm.covers.links is {', '.join(self.covers.links)}; list the covers from the base to the tool",
+        )
         self._require_plausible()
         self._require_joined()
 

@@ -39,30 +39,22 @@ def enabled(**values: Any) -> Driver:
     return hardware
 
 
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ({"arm.joints.offset": [0.0, 0.0, 2.9, 0.0], "arm.links.mass": [70.0] * 4}, r"cannot carry the links beyond"),
-        ({"arm.links.mass": [7680.0, 3.59, 1.95, 1.06]}, r"'arm.links.mass' is 7680.0 kg; allowed"),
-        (
-            {"arm.links.mass": [7.68, 3.59, 195.0, 1.06]},
-            r"the motors cannot carry the links beyond joint1: .* 1.52e\+03 N",
-        ),
-        (
-            {"arm.links.centre": [0.0] * 9 + [1.36, 0.0, 0.0]},
-            r"link4: arm.links.centre is 1.36 m .* arm is 0.965 m long",
-        ),
-        (
-            {"arm.links.inertia": [20.0] * 12},
-            r"link1: arm.links.inertia is 20 kg m\^2; allowed: up to .* kg m\^2, that of 7.68 kg at the",
-        ),
-        (
-            {"arm.links.inertia": [0.01, 0.02, 0.04] * 4},
-            r"link1: .* inertias 0.01, 0.02 and 0.04 kg m\^2; of no body .* above the sum of the others, 0.03 kg m\^2",
-        ),
-        ({"arm.gravity": [0.0, 0.0, 9.80665]}, r"arm.gravity points upwards in the base frame: z is 9.80665"),
-    ],
-)
+@pytest.mark.parametrize(("values", "text"), [
+    ({"arm.joints.offset": [0.0, 0.0, 2.9, 0.0], "arm.links.mass": [70.0] * 4}, r"cannot carry the links beyond"),
+    ({"arm.links.mass": [7680.0, 3.59, 1.95, 1.06]}, r"'arm.links.mass' is 7680.0 kg; allowed"),
+    ({"arm.links.mass": [7.68, 3.59, 195.0, 1.06]}, r"the motors cannot carry the links beyond joint1: .* 1.52e\+03 N"),
+    ({"arm.links.centre": [0.0] * 9 + [1.36, 0.0, 0.0]}, r"link4: arm.links.centre is 1.36 m .* arm is 0.965 m long"),
+    (
+        {"arm.links.inertia": [20.0] * 12},
+        r"link1: arm.links.inertia is 20 kg m\^2; allowed: up to .* kg m\^2, that of 7.68 kg at the",
+    ),
+    (
+        {"arm.links.inertia": [0.01, 0.02, 0.04] * 4},
+        r"link1: .* inertias 0.01, 0.02 and 0.04 kg m\^2; of no body .* above the sum of the others, 0.03 kg m\^2",
+    ),
+    ({"arm.gravity": [0.0, 0.0, 9.80665]}, r"arm.gravity points upwards in the base frame: z is 9.80665"),
+    ({"arm.covers.links": ["link4", "link2"]}, r"is link4, link2; list the covers from the base to the tool"),
+])  # fmt: skip
 def test_an_arm_that_cannot_be_is_refused(values: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
         WAM.with_values(values).shared  # noqa: B018 - it is built here
@@ -74,18 +66,15 @@ def test_an_arm_that_hangs_from_a_ceiling_has_its_base_turned_and_gravity_pulls_
     assert turned.plant.cable_torque == pytest.approx([-t for t in upright.plant.cable_torque], abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("configuration", "values", "text"),
-    [
-        (WAM, {"driver:world.obstacles.stiffness": [1e7]}, "too long for obstacle 'foam_box' on"),
-        (WAM, {"driver:world.obstacles.damping": [20000.0]}, "too long for obstacle 'foam_box' on"),
-        (WAM, {"driver:world.obstacles.hardening": [1e6]}, "too long for obstacle 'foam_box' on"),
-        (WAM, {"driver:world.pushers.force": [5.0], "driver:world.pushers.stiffness": [1e8]}, "pusher 'hand' on outer"),
-        (WAM, {"arm.motors.inertia": [4e-6] * 4}, "too long for cables, rotors, springs and hinges"),
-        (WAM, {"arm.cables.damping": [0.5] * 4}, "too long for cables, rotors, springs and hinges"),
-        (TESTBED, {"driver:world.springs.stiffness": [1e8]}, "too long for cables, rotors, springs and hinges"),
-    ],
-)
+@pytest.mark.parametrize(("configuration", "values", "text"), [
+    (WAM, {"driver:world.obstacles.stiffness": [1e7]}, "too long for obstacle 'foam_box' on"),
+    (WAM, {"driver:world.obstacles.damping": [20000.0]}, "too long for obstacle 'foam_box' on"),
+    (WAM, {"driver:world.obstacles.hardening": [1e6]}, "too long for obstacle 'foam_box' on"),
+    (WAM, {"driver:world.pushers.force": [5.0], "driver:world.pushers.stiffness": [1e8]}, "pusher 'hand' on outer"),
+    (WAM, {"arm.motors.inertia": [4e-6] * 4}, "too long for cables, rotors, springs and hinges"),
+    (WAM, {"arm.cables.damping": [0.5] * 4}, "too long for cables, rotors, springs and hinges"),
+    (TESTBED, {"driver:world.springs.stiffness": [1e8]}, "too long for cables, rotors, springs and hinges"),
+])  # fmt: skip
 def test_a_step_that_does_not_fit_is_refused_and_the_one_it_names_is_taken(
     configuration: Configuration, values: dict[str, Any], text: str
 ) -> None:
@@ -167,14 +156,11 @@ def test_a_simulation_that_fails_is_a_fault_with_brakes_and_a_finite_state(
 PUSHED = r"push less, or " + re.escape(LESS)
 
 
-@pytest.mark.parametrize(
-    ("ended", "advice"),
-    [
-        (0.0, r"a push acts \(1.2 N on outer_link\); " + PUSHED),
-        (0.05, r"a push acted until 0.\d\d s before \(1.2 N on outer_link\); " + PUSHED),
-        (0.5, re.escape(LESS)),
-    ],
-)
+@pytest.mark.parametrize(("ended", "advice"), [
+    (0.0, r"a push acts \(1.2 N on outer_link\); " + PUSHED),
+    (0.05, r"a push acted until 0.\d\d s before \(1.2 N on outer_link\); " + PUSHED),
+    (0.5, re.escape(LESS)),
+])  # fmt: skip
 def test_a_fault_names_the_push_that_acts_or_has_just_acted(ended: float, advice: str) -> None:
     hardware = enabled(**{"driver:tip_speed_limit": 0.5})
     carried = TransmissionMap.of(ARM).motor_torques(RigidBody(ARM).gravity_torque(ARM.joints.start).tolist())
