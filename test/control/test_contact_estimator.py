@@ -10,6 +10,7 @@ from arms import CONFIGURATION
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact.contact_estimator_node import ContactEstimatorNode, _is_pressing
 from wam_control.contact.thresholds import CONTACT
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
@@ -19,6 +20,7 @@ from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, State
 from wam_description.transmission_map import TransmissionMap
+from wam_description.wiring import Inputs
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
 from wam_sim.simulation import Simulation
@@ -438,3 +440,9 @@ def test_as_a_force_begins_the_estimator_takes_the_zero_of_the_force_loop(feedba
     is_zeroed = feedback == "joint_sensors"
     assert np.any(run.rows["external_torque_zero"][-1].values) == is_zeroed
     assert (np.abs(run.estimate.external_torques).max() < 0.5 * before) == is_zeroed
+
+
+@pytest.mark.parametrize(("effort", "presses"), [([0.0, 4.0, 0.0, 2.0], True), (ZERO, False)])
+def test_torques_that_are_commanded_press_as_a_force_does(effort: list[float], presses: bool) -> None:
+    assert _is_pressing(Inputs.of(0, DT, {"joint_torque_command": (0, State([], [], effort))})) is presses
+    assert "joint_torque_command" not in ContactEstimatorNode(CONFIGURATION.shared, MOTORS).unused

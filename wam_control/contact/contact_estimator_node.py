@@ -36,7 +36,8 @@ class ContactEstimatorNode:
         self._in_contact: bool | None = None
         self._warned: Event | None = None
         self._second = -1
-        commands = {"force_command", "task_command"}  # the errors of the model are tracked from the motors alone
+        # the errors of the model are tracked from the motors alone
+        commands = {"force_command", "task_command", "joint_torque_command"}
         zero = "external_torque_zero"  # of joint sensors, which show the weight of the arm
         self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors", zero})
         self._zero: Sequence[float] = ()
@@ -47,6 +48,7 @@ class ContactEstimatorNode:
         Input("joint_sensors", absent="zero"),
         Input("force_command", age="command", answers=True),
         Input("task_command", age="command", answers=True),
+        Input("joint_torque_command", "effort", age="command", answers=True),
         Input("external_torque_zero", "effort", answers=True),
         outputs=(
             "external_joint_torques",
@@ -127,6 +129,6 @@ class ContactEstimatorNode:
 
 
 def _is_pressing(inputs: Inputs) -> bool:
-    """Whether a force is commanded, alone or along an axis of a task."""
-    force, task = inputs["force_command"], inputs["task_command"]
-    return bool(force and any(force.force)) or bool(task and is_pressing(task))
+    """Whether a force is commanded, alone or along an axis of a task, or torques."""
+    force, task, torque = inputs["force_command"], inputs["task_command"], inputs["joint_torque_command"]
+    return bool((force and any(force.force)) or (task and is_pressing(task)) or (torque and any(torque.effort)))
