@@ -300,3 +300,6 @@ def test_a_zero_in_the_same_pose_takes_the_place_of_the_one_before() -> None:
     moving = State([0.2, -1.05, 0.3, 0.5], [0.1, 0.0, 0.0, 0.0], [0.0] * 4)
     once.observe(moving, 1e-3)
     assert "the arm moves" in once.zero(24.0)
+    once.observe(moving._replace(velocity=[0.03, 0.0, 0.0, 0.0]), 1e-3)
+    assert once.zero(0.0) == "", "at rest for the force loop; and with any threshold"
+    assert np.isfinite(once.torques()[1]).all()

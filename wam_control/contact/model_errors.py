@@ -122,7 +122,7 @@ class ModelErrors:
     def zero(self, seen: Observation, detect: float) -> None:
         """Take an instant at rest as one of an arm that nothing touches.
 
-        What would count as a contact shows that the errors of the model are larger than was thought.
+        What would count as a contact, and is more than expected, shows larger errors of the model than was thought.
 
         Another one in the same pose has the same errors of the gauges: it takes the place of the one before.
         """
@@ -133,7 +133,7 @@ class ModelErrors:
         self._pose = _Pose(seen.pose, elsewhere=elsewhere)
         innovation, covariance = self.corrected(seen)
         statistic = float(innovation.dot(solution(covariance, innovation)))
-        self.covariance = self.covariance * max(1.0, statistic / detect)
+        self.covariance = self.covariance * max(1.0, statistic / max(detect, len(innovation)))
         self._take(*self.corrected(seen), seen)
 
     def _take(self, innovation: Array, covariance: Array, seen: Observation) -> None:

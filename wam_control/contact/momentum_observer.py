@@ -18,6 +18,7 @@ from wam_control.contact.motor_side import LinkMotion, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import LOG_DISTANCES
 from wam_control.contact.thresholds import CONTACT
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm
 from wam_description.event import Code, Event, warning
 from wam_description.model import ArmModel
@@ -243,7 +244,7 @@ class MomentumObserver:
             )
         if not self.is_ready:
             return "too few samples so far; try again"
-        if max(map(abs, self._last.qd)) > CONTACT.at_rest:
+        if max(map(abs, self._last.qd)) > MOTION.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
         self._errors.zero(self.seen, detect)

@@ -73,7 +73,6 @@ class ContactThresholds:
     tolerable_payload: float = 0.05  # kg
     # sd of an identified friction, per friction: what changes from the identification to the use
     identified_friction_sd: float = 0.02
-    at_rest: float = 0.02  # rad/s, of every joint, below which torques show the weights of the arm
     # friction of shafts
     slow: float = 1.2  # Stribeck velocities: speed over which what the law of friction leaves out decays
     assumed_stribeck: float = 3.0  # by which a Stribeck velocity that was not identified may be too small
