@@ -15,6 +15,7 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
+from wam_description.transmission_map import TransmissionMap
 
 TRUE = np.array([0.3, -0.2, 0.1])
 SD = 0.25
@@ -303,3 +304,23 @@ def test_a_zero_in_the_same_pose_takes_the_place_of_the_one_before() -> None:
     once.observe(moving._replace(velocity=[0.03, 0.0, 0.0, 0.0]), 1e-3)
     assert once.zero(0.0) == "", "at rest for the force loop; and with any threshold"
     assert np.isfinite(once.torques()[1]).all()
+
+
+@pytest.mark.parametrize(("kind", "weight", "friction"), [("friction of motor", 1.0, 1.1), ("masses at", 1.1, 1.0)])
+def test_an_error_is_what_an_arm_has_more_as_in_the_covariance_of_its_model(
+    kind: str, weight: float, friction: float
+) -> None:
+    own = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
+    own = dataclasses.replace(own, mass_scale=(1.0,) * 4, friction_scale=1.0)
+    shafts, body, shown = TransmissionMap.of(WAM), RigidBody(WAM), []
+    for g, f in ((1.0, 1.0), (weight, friction)):
+        observer = MomentumObserver(WAM, own, False)
+        for theta in (0.003 * np.arange(300)[:, None] + [2.0, 30.0, 3.0, 9.0]).tolist():
+            carried = shafts.motor_torques(body.gravity_torque(shafts.joint_positions(theta)).tolist())
+            torque = g * np.array(carried) + f * np.array(WAM.motors.dynamic_friction)
+            observer.observe(State(theta, [3.0] * 4, torque.tolist()), 1e-3)
+        observer.torques()
+        shown.append(observer.seen)
+    more = 0.1 * np.array([name.startswith(kind) for name in observer.model_errors])
+    assert shown[1].residual - shown[0].residual == pytest.approx(shown[0].effects @ more, abs=0.01)
+    assert np.abs(shown[0].effects @ more).max() > 0.1

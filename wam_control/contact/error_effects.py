@@ -65,7 +65,7 @@ class GaugeEffects:
         """See `ErrorEffects.observation`."""
         n = len(motion.model)
         effects = np.zeros((n, 4 * n + 1))
-        effects.ravel()[:: 4 * n + 2] = motion.model  # the diagonal
+        effects.ravel()[:: 4 * n + 2] = -motion.model  # the diagonal
         effects[:, n:] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
         residual = motion.residual - self._payload * effects[:, -1]
         moving = motion.signals  # there are none
@@ -90,7 +90,7 @@ class ErrorEffects:
         self._dynamic, levels = friction.dynamic, 0.5 * friction.dynamic
         through = self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
         # the same of the errors of the model per signal
-        self._errors = np.hstack((-through * levels, through * levels, np.eye(n), np.eye(n), -through))
+        self._errors = np.hstack((-through * levels, through * levels, -np.eye(n), -np.eye(n), -through))
         # with the model, the constants were identified that motors have in common that move the same joints
         driven = self._from_motors != 0.0
         common = (driven.T.astype(float) @ driven > 0.0).astype(float) * side.is_identified

@@ -19,6 +19,7 @@ WAYS = ("positive", "negative")
 class ModelPrior(NamedTuple):
     """Errors: friction in positive, then in negative motion; weights; inertias; load; constants; and others.
 
+    Each is what the arm has more than its model, as in the covariance of an identification.
     Friction and its share of the load are those of motors, then joints.
 
     Attributes
