@@ -10,7 +10,7 @@ import numpy as np
 from wam_analysis.drawing import COLOURS, COMMANDED, LIKELY, SHAFTS
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.repetition import held as held_command
-from wam_analysis.foreign.sources import Source
+from wam_analysis.foreign.source import Source
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, STREAM
 from wam_analysis.traces import Traces

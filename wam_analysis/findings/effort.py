@@ -8,7 +8,8 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import contradiction, rest_speed
-from wam_analysis.foreign.sources import Piece, Source, pieces, rests
+from wam_analysis.foreign.pieces import Piece, pieces, rests
+from wam_analysis.foreign.source import Source
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.measures.runs import smoothed
 from wam_analysis.recording import AnalysedRecording

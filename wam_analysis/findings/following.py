@@ -8,7 +8,7 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.force import fate_words
 from wam_analysis.findings.force_steps import UNSTABLE, force_steps, many_steps
 from wam_analysis.findings.repetition import LEAST
-from wam_analysis.foreign.sources import AXES, Source
+from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.held_messages import value_changes
 from wam_analysis.measures.following import Following, following
 from wam_analysis.recording import AnalysedRecording

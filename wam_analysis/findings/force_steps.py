@@ -11,7 +11,9 @@ from wam_analysis.findings.finding import Finding, Section, counted, shown, when
 from wam_analysis.findings.force import fate_words, response_findings
 from wam_analysis.findings.repetition import LEAST, is_known
 from wam_analysis.findings.topics import frame_change
-from wam_analysis.foreign.sources import AXES, Source, jumps, pieces
+from wam_analysis.foreign.pieces import pieces
+from wam_analysis.foreign.raw_values import jumps
+from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.held_messages import row_at, value_changes
 from wam_analysis.measures.response import StepResponse, force_response
 from wam_analysis.measures.runs import noise

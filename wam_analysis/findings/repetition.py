@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.foreign.sources import Piece, Source, pieces, rests
+from wam_analysis.foreign.pieces import Piece, pieces, rests
+from wam_analysis.foreign.source import Source
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle

@@ -9,7 +9,8 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.findings.topics import in_words
-from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests, ways
+from wam_analysis.foreign.pieces import Piece, pieces, resolution, rests, ways
+from wam_analysis.foreign.source import Source
 from wam_analysis.measures.runs import at_rest, runs, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT, STREAM

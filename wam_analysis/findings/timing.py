@@ -9,7 +9,7 @@ import numpy as np
 
 from wam_analysis.contact_list import median
 from wam_analysis.findings.finding import Finding, Section, counted, shown
-from wam_analysis.foreign.sources import Source
+from wam_analysis.foreign.source import Source
 from wam_analysis.measures.runs import missed, usual_steps
 from wam_analysis.recording import RATE, STAMPED, AnalysedRecording
 from wam_analysis.thresholds import SHAFT, STREAM

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_analysis.findings.finding import Section, counted, shown, times, when
-from wam_analysis.foreign.sources import Source, Treated, clocks_of, pieces
+from wam_analysis.foreign.pieces import pieces
+from wam_analysis.foreign.source import Source, Treated
+from wam_analysis.foreign.sources import clocks_of
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT

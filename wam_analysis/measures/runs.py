@@ -153,6 +153,25 @@ def without_turns(
     return kept
 
 
+def held_over(value: Numbers) -> Mask:
+    """Which samples only repeat the one before, where a signal changes in every second message at most, and evenly.
+
+    One that rests, or moves by counts of an encoder, repeats samples, too, but changes by one count.
+    """
+    steps = np.abs(np.diff(value))
+    changed = np.flatnonzero(steps > 0.0) + 1
+    apart, sizes = np.diff(changed), steps[changed - 1]
+    if len(apart) < SHAFT.fewest_samples or np.any(np.isnan(steps)):
+        return np.zeros(len(value), np.bool_)
+    often = np.median(apart)
+    is_even = np.mean((apart > 1) & (np.abs(apart - often) <= 1.0)) >= STREAM.evenly
+    if not is_even or np.median(sizes) < STREAM.counts * np.min(sizes):
+        return np.zeros(len(value), np.bool_)
+    row = np.arange(len(value))
+    since = row - np.concatenate([[0], changed])[np.searchsorted(changed, row, side="right")]
+    return since % math.ceil(np.quantile(apart, STREAM.evenly)) > 0
+
+
 def noise(value: Numbers) -> float:
     """Standard deviation of the noise of a signal, from its second and higher differences, or its spectrum.
 
