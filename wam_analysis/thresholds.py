@@ -73,6 +73,7 @@ class CycleThresholds:
     # limit cycles
     phases: int = 192  # of a cycle that are resolved, if there are enough samples
     phase_samples: int = 8  # samples for each of them
+    few_samples: float = 8.0  # of a cycle, which are not folded: they may all miss its peak
     cycles: int = 3  # cycles that are needed
     shortest_period: float = 2.0  # samples; what repeats faster cannot be seen
     # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
@@ -227,6 +228,7 @@ class StreamThresholds:
     pace: float = 0.2  # by which the median period of the receptions may differ from that of the stamps
     # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
     reset: int = 1_000_000_000
+    late: int = 50_000_000  # ns after which few messages are received, and before which none is
     away: int = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
     live: float = 0.1  # of the time that the stamps take: receptions in less are those of a file that was converted
     drift: float = 1e-3  # of its speed, by which a clock is wrong: of quartz 1e-4 at most, while it is adjusted 5e-4
@@ -258,6 +260,7 @@ class StreamThresholds:
     zero: float = 5.0  # times the usual change, or what the velocity leaves of it: more is a jump
     beyond: float = 2.0  # times the largest step by the velocity: a larger one does
     around: int = 2  # steps on each side that show the velocity where none was recorded
+    rounding: float = 1e-9  # of the range of a signal: a smaller change is one of the arithmetic
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
     averaged: float = 0.2  # s, over which a recorded velocity is compared with the rate of the position

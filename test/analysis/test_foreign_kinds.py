@@ -85,6 +85,9 @@ def wraps() -> list[Case]:
              sine(0.2, 20.0) | FRICTION, said),
         Case("in degrees", ros1, degrees, sine(0.25, largest), said, DEGREES),
         Case("position alone", by_rosbags, alone, sine(0.3, 5.0), said),
+        Case("rests at pi", sqlite, joints("/s", np.arange(3000) / 100.0, ["a"], position=wrapped(-math.pi)(
+            math.pi + 2e-4 * np.random.default_rng(8).choice([0, -1, 1], (3000, 1), p=[0.86, 0.09, 0.05]))), {}, said,
+            NOTHING, ("a: never moved.",)),
         Case("an encoder behind a gear", sqlite, one("/joint_states", 100.0, 0.3, 2.5, wrapped(-0.6, 1.2)),
              sine(0.3, 2.5) | FRICTION, said),
         Case("a counter of 16 bits", by_mcap_ros2, one("/joint_states", 100.0, 0.3, 5e5, wrapped(-32768.0, 65536.0)),
@@ -112,6 +115,10 @@ def sparse() -> list[Case]:
                sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate, "/joint_states: missed periods": 0.0},
                f"in only {kept} of {30.0 * rate:g} messages")
           for name, write, rate, lacks, fields, kept in made),
+        *(Case(f"{quantity} of 0", ros1, [s._replace(fields=s.fields | {quantity: [0.0]} if i % 4 in zero else s.fields)
+               for i, s in enumerate(one("/js", 100.0, 0.7, 0.5))], sine(0.7, 0.5) | FRICTION,
+               f"the {quantity} jumps to 0 in {750 * len(zero)} of 3000 messages")
+          for quantity, zero in (("position", (0,)), ("velocity", (1,)), ("effort", (1,)), ("effort", (0, 2)))),
         Case("in turns", sqlite, without(without(one("/js", 100.0, 0.7, 0.5), lambda i: i % 2, "effort"),
                                          lambda i: not i % 2, "position", "velocity"),
              sine(0.7, 0.5) | FRICTION, "1500 of 3000"),
@@ -152,6 +159,16 @@ def twice() -> list[Case]:
     slow = [s._replace(stamp=s.stamp - 1.7e9, received=s.stamp / 0.4 + 12.0 * (s.stamp > 13.0)) for s in sent]
     slow += [slow[1300]._replace(received=slow[1300].received + 0.025 * k) for k in range(1, 480)]
     return [
+        *(
+            Case(
+                f"receptions set by {by:g} s",
+                ros1,
+                [s._replace(received=s.received + by * (s.stamp > 11.0)) for s in sent],
+                expected | {"/joint_states: delay of the receptions": 1.0},
+                f"by up to {abs(by):g} s",
+            )
+            for by in (-2.0, -0.5, 5.0)
+        ),
         Case("a simulation that stopped", ros1, slow, expected, "the first message of each is used"),
         Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
         Case("relayed", by_mcap_ros2, sent + relayed, expected, "3000 of 6000 messages repeat the one before"),
@@ -301,6 +318,10 @@ def follows() -> list[Case]:
         return Case(f"a trajectory {more}", by_rosbags, sent, expected, "", NOTHING, ("/t: 1 message;",))
 
     return [
+        *(Case(f"a clock {by:g} s off", sqlite, [s._replace(stamp=s.stamp + by * (s.topic == topic))
+               for s in joint(path(time), path(time - 0.03))], {"a position: delay": 0.03 - min(by, 0.0)}, told, to)
+          for topic, by, told in (("/cmd", 0.35, "/cmd: stamps 0.35 s ahead"), ("/js", 0.6, "/js: stamps 0.6 s ahead"),
+                                  ("/cmd", -0.2, "0.2 s behind those of /js, as sent late"))),
         Case("late", by_rosbags, joint(path(time), 0.9 * path(time - 0.03)), {"a position: gain": 0.9,
              "a position: delay": 0.03}, "", to, ("Shows: a position: follows ",)),
         Case("play", ros1, joint(path(time), played, 2), {"a position: play": 0.02, "a position: delay": 0.02}, "", to),
@@ -362,7 +383,7 @@ def still() -> list[Case]:
         Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
              {"a: frequency": 0.3}, "", NOTHING, ("a: moved by 0.00614 rad, more slowly than 0.0939 rad/s, or",)),
         *(with_flicker(*each) for each in ((by_rosbags, 1, 1e-4, 0.0), (sqlite, 2, 1e-3, 1e-4), (ros1, 3, 2e-5, 1e-3),
-                                           (sqlite, 4, 1.9e-3, 0.0, 0.003))),
+                                           (sqlite, 4, 1.9e-3, 0.0, 0.003), (ros1, 5, 4e-4, 0.0, 0.13))),
         Case("a belt", ros1, joints("/s", np.arange(600) / 50.0, ["a"], position=0.02 * np.arange(600)[:, None]),
              {}, "", NOTHING, ("a: always in motion",)),
         Case("noise", by_rosbags,
@@ -469,7 +490,13 @@ def contradictions() -> list[Case]:
     counts = 0.0015 * np.rint(np.clip(np.arange(3000) - [[900], [1900]], 0, 60) / 30.0).sum(0)[:, None]
     pulses = joints("/js", np.arange(3000) / 100.0, ["a"], position=counts, velocity=100.0 * np.diff(
         counts, axis=0, prepend=0.0))  # fmt: skip
-    both += [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), Case("pulses of an encoder", sqlite, pulses, {})]
+    seen = one("/js", 100.0, 0.1, 0.05, lambda q: q + 2e-3 * np.random.default_rng(2).normal(size=len(q)))
+    both += [
+        Case("slow for its noise", by_rosbags, seen, {}),
+        late(10, by_rosbags, 100.0),
+        late(4, ros1, 250.0),
+        Case("pulses of an encoder", sqlite, pulses, {}),
+    ]
     both += [scaled(*each) for each in scales]
     return [*both, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0),
             Case("slips now and then", by_rosbags, one("/js", 100.0, 0.3, 0.7, lambda q: q - 0.15 * np.clip(

@@ -65,6 +65,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
+    if not driven and (still := [one.label for one in moving if "effort" in one.values]):
+        doubts.append(f"{', '.join(still)}: the effort never changes.")
     doubts += [RECORD] * bool(doubts or not (sentences or wrong))
     if alone:
         doubts.append(

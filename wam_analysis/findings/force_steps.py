@@ -81,7 +81,8 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     for left, part in zip([0, *held + 1], held, strict=False):
         row, begin = edges[part], max(float(at[part]), float(measured.time[0]))
         end = min(at[part + 1], command.leaves(begin), measured.leaves(begin))
-        since, was, wanted = at[left], desired[edges[left] - 1] * (left > 0), desired[edges[part + 1] - 1]
+        since, was = at[left], desired[edges[left] - 1] * (left > 0)
+        wanted = np.median(desired[row : edges[part + 1]], axis=0)  # a path that begins slowly has left it at the end
         change = wanted - was
         size = float(np.linalg.norm(change))
         if size <= least or command.arrives[row] or end - begin < HOLD.shortest:

@@ -14,6 +14,7 @@ from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import spectral_lines
+from wam_analysis.measures.runs import count
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
@@ -92,7 +93,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
         unit = one.units[quantity]
         for line in spectral_lines(piece.time, piece.values[quantity], piece.stamps):
             begins.append(line.frequency)
-            if 2.0 * line.amplitude > max(LEAST[unit], _count(piece.recorded[quantity])):
+            if 2.0 * line.amplitude > max(LEAST[unit], count(piece.recorded[quantity])):
                 name = f"{label}, {shown(line.frequency, 'Hz')}"
                 findings.append(Finding(f"{name}: amplitude", unit, line.amplitude))
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
@@ -102,12 +103,6 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
     span = f"To find vibrations below {least}, record longer without a gap."
     silent = f"No clear vibration was found above {least} that lasts throughout."
     return Section("frequency", "Spectrum", (span if findings else silent,), findings)
-
-
-def _count(value: Numbers) -> float:
-    """The smallest change of a signal, as a count of its encoder, which is no vibration; rounding apart."""
-    change = np.abs(np.diff(value))
-    return float(np.min(change[change > 1e-9 * np.ptp(value)], initial=np.ptp(value)))
 
 
 def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from wam_analysis.findings.finding import shown
+from wam_analysis.findings.finding import shown, times
 from wam_analysis.foreign.topic_map import UNITS, TopicMap
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Index, Times
@@ -18,6 +18,7 @@ from wam_bag.bag import JointColumns, WrenchColumns
 
 BILLION = 1_000_000_000
 CLOCK_SET = "the clock of its stamps was changed, or never set; reception times are used"
+RECORDER_SET = "the clock of the receptions was set {times}, by up to {size}; the stamps are used"
 
 
 class Clock(NamedTuple):
@@ -26,11 +27,18 @@ class Clock(NamedTuple):
     Attributes
     ----------
     times : (n,), ns, on the clock that all topics of the recording share.
-    note : what the stamps are where the times are others; '' where they are the stamps.
+    received : (n,), ns, when they were received, by a clock that nobody set meanwhile.
+    notes : what is wrong with the stamps or the receptions, and what was done.
     """
 
     times: Times
-    note: str
+    received: Times
+    notes: tuple[str, ...]
+
+    @property
+    def age(self) -> int:
+        """By how much later a message was received than sent, median, ns."""
+        return int(np.median(self.received - self.times))
 
 
 def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Times | None = None) -> Times:
@@ -85,38 +93,50 @@ def joined_times(seconds: NDArray[Any], rest: NDArray[Any]) -> NDArray[Any]:
 def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Clock]:
     """The times of each topic, on the clock of the stamped topic with the most messages.
 
-    What a message was later received than sent is the same for two topics of one clock, up to a second.  Where it is
-    not, the stamps are shifted by the difference, or those of a clock of another rate replaced by what the other clock
-    showed at their reception.
+    What a message was later received than sent is the same for two topics of one clock, up to a second, and no message
+    is received before it was sent.  Where it is not, the stamps are shifted by the difference, or those of a clock of
+    another rate replaced by what the other clock showed at their reception.
     """
     found = {}
     for topic, columns in topics.items():
-        times = rising(columns.stamp_ns, columns.log_time_ns)
-        found[topic] = Clock(times, CLOCK_SET * (not np.array_equal(times, columns.stamp_ns)))
-    first = max(found, key=lambda topic: (not found[topic].note, len(found[topic].times)), default="")
-    for topic, columns in topics.items():
-        if topic != first:
-            reference = found[first].times, topics[first].log_time_ns
-            found[topic] = _compared(found[topic], columns.log_time_ns, *reference, first)
-    return found
+        received, notes = _unset(columns.stamp_ns, columns.log_time_ns)
+        sent = rising(columns.stamp_ns, received)
+        found[topic] = Clock(sent, received, notes + (CLOCK_SET,) * (not np.array_equal(sent, columns.stamp_ns)))
+    trust = {topic: (CLOCK_SET not in one.notes, abs(one.age) <= STREAM.late) for topic, one in found.items()}
+    first = max(found, key=lambda topic: (*trust[topic], len(found[topic].times)), default="")
+    return {topic: clock if topic == first else _compared(clock, found[first], first) for topic, clock in found.items()}
 
 
-def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name: str) -> Clock:
+def _compared(clock: Clock, reference: Clock, name: str) -> Clock:
     """A clock by that of a reference, whose messages of some times arrived then."""
-    if np.ptp(arrivals) < STREAM.live * np.ptp(times):
+    if np.ptp(reference.received) < STREAM.live * np.ptp(reference.times):
         return clock
-    order = np.argsort(arrivals, kind="stable")
-    there = np.interp(received, arrivals[order], (arrivals - times)[order])
-    apart = received - clock.times - there.astype(np.int64)
+    order = np.argsort(reference.received, kind="stable")
+    late = (reference.received - reference.times)[order]
+    apart = clock.received - clock.times - np.interp(clock.received, reference.received[order], late).astype(np.int64)
     shift = int(np.median(apart))
     spread = float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05))
-    if max(abs(shift), spread) <= STREAM.reset:
-        return clock
-    side = "behind" if shift > 0 else "ahead of"
-    of = "of another clock" if len(received) > 1 else "of another clock, or sent before the recording"
     by, done = (apart, "reception times are used") if spread > STREAM.reset else (shift, "they are shifted by this")
-    note = f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as {of}; {done}"
-    return Clock(clock.times + by, clock.note or note)
+    of = "of another clock" if len(apart) > 1 else "of another clock, or sent before the recording"
+    if max(abs(shift), spread) <= (STREAM.late if min(clock.age, reference.age) < -STREAM.late else STREAM.reset):
+        if abs(shift) <= STREAM.late or len(apart) < STREAM.fewest:
+            return clock
+        by, done, of = 0, "they are used", "sent late, or of another clock"
+    note = f"stamps {abs(shift) / 1e9:.4g} s {'behind' if shift > 0 else 'ahead of'} those of {name}, as {of}; {done}"
+    return clock._replace(times=clock.times + by, notes=clock.notes or (note,))
+
+
+def _unset(stamps: Times, received: Times) -> tuple[Times, tuple[str, ...]]:
+    """Receptions by a clock that went on as the stamps did, and what is said where it was set."""
+    order = np.argsort(stamps, kind="stable")
+    age = (received - stamps)[order]
+    if not len(rows := _sets(received[order], stamps[order])):
+        return received, ()
+    usual = np.array([np.median(part) for part in np.split(age, rows + 1)], np.int64)
+    steady = received.copy()
+    steady[order] -= np.repeat(usual - usual[0], np.diff([0, *(rows + 1), len(age)]))
+    size = shown(float(np.max(np.abs(np.diff(usual)))) / 1e9, "s")
+    return steady, (RECORDER_SET.format(times=times(len(rows)), size=size),)
 
 
 def rising(stamps: Times, received: Times) -> Times:
@@ -141,7 +161,7 @@ def rising(stamps: Times, received: Times) -> Times:
     if keeps_pace and len(rows := _sets(stamps, received)):
         parts = np.split(received - stamps, rows + 1)
         stamps = stamps + np.concatenate([np.full(len(part), int(np.median(part))) for part in parts])
-    steps = np.diff(stamps)
+    steps = np.diff(stamps[np.argsort(received, kind="stable")])
     return received if not np.any(steps) or np.any(steps < -STREAM.reset) else stamps
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.foreign.source import Source, Treated, Treatment
-from wam_analysis.measures.runs import noise, usual_steps
+from wam_analysis.measures.runs import count, noise, usual_steps
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Numbers
 
@@ -53,13 +53,13 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
     found = []
     for begin, end in zip([0, *inner], [*inner, len(source.time)], strict=True):
         time = source.time[begin:end]
-        count = round((time[-1] - time[0]) / period) + 1
-        if min(len(time), count) < SHAFT.fewest_samples:
+        number = round((time[-1] - time[0]) / period) + 1
+        if min(len(time), number) < SHAFT.fewest_samples:
             continue
         values = {q: v[begin:end] for q, v in source.values.items()}
         stamps, recorded = time, values
         if np.max(np.abs(np.diff(time) - period)) > STREAM.irregular * period:
-            even = np.linspace(time[0], time[-1], count)
+            even = np.linspace(time[0], time[-1], number)
             values = {q: np.interp(even, time, v) for q, v in values.items()}
             time = even
         sd = {q: resolution(v) for q, v in values.items()}
@@ -76,11 +76,10 @@ def resolution(value: Numbers) -> float:
     What moves by the same in every sample shows no rounding.
     """
     steps = np.diff(value)
-    sizes = np.abs(steps[steps != 0.0])
-    if not len(sizes):
+    quantum = count(value)
+    if quantum == math.inf:
         return 0.0
-    quantum = float(np.min(sizes))
-    counts = sizes / quantum
+    counts = np.abs(steps[steps != 0.0]) / quantum
     # from place to place, to stay there, as a gripper does: no flicker of an encoder
     is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(steps) < np.std(value)
     is_even = is_step or np.ptp(steps) < 0.5 * quantum
@@ -95,7 +94,8 @@ def rests(source: Source) -> bool:
         return False
     sd = resolution(position)
     most = np.ptp(np.percentile(position, (5.0, 95.0)))  # of the time in one place, but for its noise
-    return bool(most <= SHAFT.noisy * sd and np.ptp(position) <= SHAFT.far * sd)
+    flickers = sd > noise(position) and most < 2.5 * count(position)  # by one count to either side
+    return bool((flickers or most <= SHAFT.noisy * sd) and np.ptp(position) <= SHAFT.far * sd)
 
 
 def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
@@ -132,11 +132,15 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
     has_both = len(shown.values) == 2 and not rests(source)
     for piece in pieces(shown) if has_both else ():
         width = max(1, round(STREAM.averaged / piece.period))
-        if len(piece.time) > width + 1:
-            span = width * piece.period
-            rate, mean = (way / span for way in ways(piece, width))
-            moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["position"] / span)
-            parts.append(np.column_stack([mean, rate, np.gradient(rate, piece.period)])[moves])
+        while len(piece.time) > width + 1:
+            span, least = width * piece.period, SHAFT.noisy * resolution(piece.recorded["position"])
+            way, by = ways(piece, width)
+            if np.max(np.abs(way)) > 2.0 * least:
+                rate = way / span
+                moves = np.abs(rate) > max(SHAFT.joint_rest, least / span)
+                parts.append(np.column_stack([by / span, rate, np.gradient(rate, piece.period)])[moves])
+                break
+            width *= 2  # it moves too slowly for its noise
     velocity, rate, change = np.vstack(parts).T
     if len(rate) and not np.any(recorded := shown.values["velocity"]):
         return 0.0, Treated(Treatment.UNFILLED, "velocity")

@@ -1,6 +1,7 @@
 """A source without wraps, spikes, frozen stretches and jumps of its zero, and what of these it had."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -8,82 +9,100 @@ from numpy.lib.stride_tricks import sliding_window_view
 from wam_analysis.foreign.pieces import moved_by, rests, velocity_fit
 from wam_analysis.foreign.source import Source, Treated, Treatment
 from wam_analysis.held_messages import row_at
-from wam_analysis.measures.runs import after_gaps, held_over
+from wam_analysis.measures.runs import after_gaps, count, held_over, runs
 from wam_analysis.thresholds import SHAFT, STREAM
-from wam_bag.arrays import Index, Numbers
+from wam_bag.arrays import Index, Mask, Numbers
 
 
 def treated_source(one: Source) -> Source:
     """The source without wraps and jumps of the zero, and with what is known of its gaps."""
-    values, treated = dict(one.values), list(one.treated)
-    for quantity, value in values.items():
-        if not one.is_command and (number := int(np.sum(held := held_over(value)))):
-            values[quantity] = np.where(held, math.nan, value)
-            treated.append(Treated(Treatment.HELD, quantity, number, len(value)))
-        elif (number := int(np.sum(np.isfinite(value)))) < len(value):
-            treated.append(Treated(Treatment.SPARSE, quantity, number, len(value)))
-    if "position" in values and one.units["position"] == "rad":
-        position = values["position"].copy()
-        known = np.isfinite(position)
-        speed = np.nan_to_num(values.get("velocity", np.zeros(len(position))))[known]
-        position[known], wraps, turn = _unwrapped(one.time[known], position[known], speed, one.is_command)
-        if wraps:
-            values["position"] = position
-            treated.append(Treated(Treatment.WRAPPED, "position", wraps, size=turn))
-    measured = {} if one.is_command else values
-    at, moves = _jumps(one._replace(values=measured))
+    one = _without_wraps(_with_gaps(one))
+    return _without_unfit(one if one.is_command else _without_jumps(_without_spikes(one)))
+
+
+def _with_gaps(one: Source) -> Source:
+    """A source without values that a message only repeats, or does not have."""
+    for quantity, value in one.values.items():
+        others = [np.nan_to_num(other) for name, other in one.values.items() if name != quantity]
+        found = {} if one.is_command else {Treatment.ZERO: _not_filled(value, others), Treatment.HELD: held_over(value)}
+        found[Treatment.SPARSE] = ~np.isfinite(value)
+        what, mask = next(((what, mask) for what, mask in found.items() if np.any(mask)), (None, None))
+        if what and mask is not None:
+            number = int(np.sum(~mask if what is Treatment.SPARSE else mask))
+            treated = Treated(what, quantity, number, len(value))
+            one = one.with_values({quantity: np.where(mask, math.nan, value)}, treated)
+    return one
+
+
+def _without_wraps(one: Source) -> Source:
+    """A source whose position does not wrap."""
+    if "position" not in one.values or one.units["position"] != "rad":
+        return one
+    position = one.values["position"].copy()
+    known = np.isfinite(position)
+    speed = np.nan_to_num(one.values.get("velocity", np.zeros(len(position))))[known]
+    position[known], wraps, turn = _unwrapped(one.time[known], position[known], speed, one.is_command)
+    treated = Treated(Treatment.WRAPPED, "position", wraps, size=turn)
+    return one.with_values({"position": position}, treated) if wraps else one
+
+
+def _without_spikes(one: Source) -> Source:
+    """A source without single samples that are away from those before and after."""
+    at, moves = _jumps(one)
     back = at[:-1][moves[:-1] * moves[1:] < 0.0]
-    for quantity, value in measured.items():
+    for quantity, value in one.values.items():
         # a zero that would move and move back is a single sample, too
         least = SHAFT.joint_rest * (quantity == "position")
         rows = row_at(one.time, back) if least and len(back) else _spikes(value, least)
-        if len(rows) and quantity == "velocity" and "position" in values:  # what its position does, too, is motion
-            steps = np.abs(np.diff(values["position"]) / np.diff(one.time))
+        if len(rows) and quantity == "velocity" and "position" in one.values:  # what its position does, too, is motion
+            steps = np.abs(np.diff(one.values["position"]) / np.diff(one.time))
             rows = rows[~(2.0 * np.maximum(steps[rows - 1], steps[rows]) > np.abs(value[rows]))]
         if len(rows):
-            mean, values[quantity] = 0.5 * (value[rows - 1] + value[rows + 1]), value.copy()
-            values[quantity][rows] = mean
-            size = np.max(np.abs(value[rows] - mean))
-            treated.append(Treated(Treatment.SPIKES, quantity, len(rows), size=size))
-    if not one.is_command:
-        values, found = _without_jumps(one._replace(values=values))
-        treated += found
-    factor, unfit = velocity_fit(one._replace(values=values))
-    if unfit and not one.is_command:
-        del values["velocity"]
-        treated.append(unfit)
-        factor = math.nan
-    return one._replace(values=values, treated=tuple(treated), velocity_factor=factor)
+            mean, smooth = 0.5 * (value[rows - 1] + value[rows + 1]), value.copy()
+            smooth[rows] = mean
+            treated = Treated(Treatment.SPIKES, quantity, len(rows), size=np.max(np.abs(value[rows] - mean)))
+            one = one.with_values({quantity: smooth}, treated)
+    return one
 
 
-def _without_jumps(one: Source) -> tuple[dict[str, Numbers], list[Treated]]:
-    """Values without what was frozen before a jump, and without jumps of the zero; what of these there is.
+def _without_unfit(one: Source) -> Source:
+    """A source without a velocity that is not the rate of its position."""
+    factor, unfit = velocity_fit(one)
+    if one.is_command:
+        return one._replace(velocity_factor=factor)
+    if unfit:
+        factor, one = math.nan, one.without("velocity", unfit)
+    return one._replace(velocity_factor=factor)
+
+
+def _without_jumps(one: Source) -> Source:
+    """A source without what was frozen before a jump, and without jumps of the zero.
 
     Of a joint without a velocity, which comes back, or never moves otherwise, nothing shows that it did not move.
     """
-    values, treated = dict(one.values), []
     at, moves = _jumps(one)
     shown = one.only("position", "velocity")
     frozen = [(first, after) for after in np.flatnonzero(moves).tolist() if (first := _frozen(shown, after)) < after]
+    values = dict[str, Numbers]()
     for first, after in frozen:
         moves[after] = 0.0
         begin, end = row_at(one.time, at[[first, after]])
-        for quantity, value in one.values.items():
+        for quantity, value in (one.values | values).items():
             if np.all(value[begin:end] == value[begin]):
-                values[quantity] = values[quantity].copy()
+                values[quantity] = value.copy()
                 values[quantity][begin + 1 : end] = math.nan
     if frozen:
         number = sum(after - first - 1 for first, after in frozen)
-        treated.append(Treated(Treatment.FROZEN, "position", number, len(at)))
+        one = one.with_values(values, Treated(Treatment.FROZEN, "position", number, len(at)))
     sizes = moves[moves != 0.0]
     comes_back = abs(np.sum(sizes)) < SHAFT.much_better * np.sum(np.abs(sizes))
-    if not len(sizes) or ("velocity" not in values and comes_back):
-        return values, treated
-    position = values["position"] - np.cumsum(moves)[row_at(at, one.time)]
-    if "velocity" in values or not rests(one._replace(values={"position": position})):
-        values["position"] = position
-        treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs)))
-    return values, treated
+    if not len(sizes) or ("velocity" not in one.values and comes_back):
+        return one
+    position = one.values["position"] - np.cumsum(moves)[row_at(at, one.time)]
+    if "velocity" in one.values or not rests(one._replace(values={"position": position})):
+        treated = Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs))
+        return one.with_values({"position": position}, treated)
+    return one
 
 
 def _frozen(shown: Source, after: int) -> int:
@@ -105,6 +124,28 @@ def _frozen(shown: Source, after: int) -> int:
     ]
     repeats = velocity[first] != 0.0 and not np.ptp(velocity[first:after])
     return first if repeats or min(abs(jump - way) for way in ways) < SHAFT.much_better * abs(jump) else after
+
+
+def _not_filled(value: Numbers, around: Sequence[Numbers]) -> Mask:
+    """Which samples are 0 because a message had no number: single ones, or all but single ones, far from the others.
+
+    Where all of a message is 0 it is of another sender.
+    """
+    zero = value == 0.0
+    others = np.flatnonzero(~zero & np.isfinite(value))
+    nothing = np.zeros(len(value), np.bool_)
+    if not 2 * np.count_nonzero(np.any([nothing, *around], axis=0)[zero]) > np.count_nonzero(zero):
+        return nothing
+    if np.mean(zero) <= STREAM.repeated or len(others) < SHAFT.fewest_samples:
+        return nothing
+    if min(np.median(np.diff(runs(mask), axis=1)) for mask in (zero, ~zero)) > 1.0:
+        return nothing
+    near = value[others]
+    after = np.searchsorted(others, np.flatnonzero(zero))
+    sides = near[np.clip(after - 1, 0, None)], near[np.clip(after, None, len(near) - 1)]
+    away = np.where(sides[0] * sides[1] > 0.0, np.fmin(np.abs(sides[0]), np.abs(sides[1])), 0.0)
+    least = max(STREAM.zero * count(near), SHAFT.much_better * float(np.median(np.abs(near))))
+    return zero if np.median(away) > least else nothing
 
 
 def _spikes(value: Numbers, least: float) -> Index:
@@ -190,7 +231,7 @@ def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None 
         rates = np.pad(steps / waits, STREAM.around, "edge")
         rate = np.median(sliding_window_view(rates, 2 * STREAM.around + 1), axis=1)
         moved, fastest = rate * waits, np.abs(rate)
-        finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
+        finest = count(value)
     rest = steps - moved
     usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
     is_jump = np.abs(rest) > np.maximum(STREAM.beyond * fastest * waits, max(usual, least))

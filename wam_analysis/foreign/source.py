@@ -27,6 +27,7 @@ class Treatment(StrEnum):
     MOVED_ZERO = "the zero of the {quantity} moves {times}, by up to {size}; this is removed"
     HELD = "{quantity} only repeated in {number} of {of} messages; the others are used"
     UNFILLED = "the {quantity} is 0 in every message although the position moves; the rate of that is used"
+    ZERO = "the {quantity} jumps to 0 in {number} of {of} messages; the others are used"
     LATE = "the {quantity} is about {size}, as by a filter; the rate of the position is used"
     SCALED = "the {quantity} is {factor:.3g} times the rate of the position; that rate is used"
     FROZEN = "the {quantity} is frozen in motion in {number} of {of} messages, and then jumps on; they are left out"
@@ -95,6 +96,16 @@ class Source(NamedTuple):
             values |= {q: _between(self.time, values[q]) for q in [*values][:-1]}
             known = _known(self, values)
         return self._replace(time=self.time[known], values={q: v[known] for q, v in values.items()})
+
+    def with_values(self, values: Mapping[str, Numbers], treated: Treated) -> "Source":
+        """The source with other values of some quantities, and what was done to them."""
+        return self._replace(values=self.values | dict(values), treated=(*self.treated, treated))
+
+    def without(self, quantity: str, treated: Treated) -> "Source":
+        """The source without a quantity, and why."""
+        return self._replace(
+            values={q: v for q, v in self.values.items() if q != quantity}, treated=(*self.treated, treated)
+        )
 
     @property
     def is_joint(self) -> bool:

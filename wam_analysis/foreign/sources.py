@@ -13,6 +13,7 @@ from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.foreign.stamps import Timed, timed_messages
 from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.measures.runs import smallest
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
@@ -26,7 +27,7 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
     origin = min((int(clock.times.min()) for clock in found_clocks.values()), default=0)
     for topic, columns in _stamped(bag).items():
         is_command = bag.types.get(topic) == COMMAND
-        clock, received = found_clocks[topic].times - origin, columns.log_time_ns - origin
+        clock, received = found_clocks[topic].times - origin, found_clocks[topic].received - origin
         timed: dict[bytes, Timed] = {}
         parts = _parts(columns)
         nothing = np.full(len(clock), math.nan)
@@ -108,12 +109,12 @@ def alternates(source: Source) -> bool:
             np.minimum(np.abs(far - here), np.abs(far - next_to)) for far, next_to in ((before, last), (after, then))
         ]
         twice = np.abs(then - last)
-        finest = max(
+        coarse = max(
             float(np.median(twice)),
-            float(np.min(twice, initial=math.inf, where=twice > 0.0)) if np.any(twice) else 0.0,
+            finest if (finest := smallest(twice, float(np.ptp(values)))) < math.inf else 0.0,
             CYCLE.still_shaft / STREAM.zero if quantity == "position" else 0.0,
         )
-        away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, finest))
+        away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, coarse))
         if np.mean(away) > (STREAM.repeated / 2.0 if quantity == "position" else 0.5):
             return True
     return False

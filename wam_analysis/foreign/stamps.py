@@ -56,7 +56,7 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
     if not is_rounded and (is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]):
         left_out = of - int(np.sum(kept))
         return Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
-    what = Treatment.BETWEEN if is_few else Treatment.SPREAD
+    what = Treatment.BETWEEN if is_few or not quantum else Treatment.SPREAD
     return Timed(rows, placed / 1e9, (Treated(what, "", number, of, quantum / 1e9),))
 
 

@@ -164,5 +164,5 @@ def _changing(time: Numbers, flat: Numbers, period: float) -> LimitCycle | None:
     """The cycle of a motion that repeats at a period, but decays or grows; None of any other."""
     cycle = limit_cycle(time, flat, period)
     change = 1.0 - min(cycle.growth, 1.0 / cycle.growth) if cycle.growth > 0.0 else 1.0
-    is_one = cycle.cycles > 0.0 and change > 1.0 - CYCLE.sure and cycle.confidence + change >= CYCLE.sure
+    is_one = min(cycle.explained, change) > 1.0 - CYCLE.sure and cycle.confidence + change >= CYCLE.sure
     return cycle if is_one else None

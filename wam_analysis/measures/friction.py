@@ -161,7 +161,11 @@ def _in_motion(
     columns = np.column_stack([direction, v, acceleration, np.ones(len(rows)), *others[:number]])
     disturbances = np.column_stack([np.empty((len(rows), 0)), *others[number:]])
     solution, errors, residual = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
-    fast = float(np.std(torque[rows] - wanted))
+    once = np.convolve(torque, triangle, "same")
+    curved = np.convolve(once, triangle, "same") - once  # what an average leaves out of a smooth motion, too
+    inner = rows[np.isin(rows - half, rows) & np.isin(rows + half, rows)]
+    inner, part = (inner, 1.0) if len(inner) >= SHAFT.fewest_samples else (rows, 0.0)
+    fast = float(np.std((torque - once + part * curved)[inner]))
     left = residual, math.hypot(residual, fast) / max(float(np.std(torque[rows])), 1e-300)
     scatter = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
     uneven = SHAFT.uneven * abs(solution[0]) / scatter if scatter > 0.0 else math.inf

@@ -19,8 +19,9 @@ class LimitCycle(NamedTuple):
     peak_to_peak : of the mean cycle, in the unit of the signal; NaN if none was found.
     period : s; NaN if none was found.
     cycles : how many the recording holds.
-    confidence : 0 to 1: the fraction of the motion that the mean cycle explains, less the relative change of
-        its size from the first half to the second.  It is near 0 for noise and single transients.
+    explained : fraction of the motion that the mean cycle explains.
+    confidence : 0 to 1: that, less the relative change of its size from the first half to the second.  It is near 0
+        for noise and single transients.
     growth : size of the second half over that of the first; 1 for a limit cycle.
     shape : (phases,), the mean cycle from its lowest phase on.
     """
@@ -28,12 +29,13 @@ class LimitCycle(NamedTuple):
     peak_to_peak: float
     period: float
     cycles: float
+    explained: float
     confidence: float
     growth: float
     shape: Numbers
 
 
-NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
+NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, 0.0, math.nan, np.empty(0))
 
 
 def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> LimitCycle:
@@ -83,6 +85,7 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
         peak_to_peak=folded.size,
         period=lag * seconds,
         cycles=n / lag,
+        explained=folded.explained,
         confidence=max(0.0, folded.explained - change),
         growth=growth,
         shape=np.roll(folded.shape, -int(np.argmin(folded.shape))) + float(np.mean(value)),
@@ -160,16 +163,36 @@ class _Folded(NamedTuple):
 
 
 def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
+    samples = 1.0 / float(np.median(np.diff(phase) % 1.0))
+    if samples < CYCLE.few_samples:
+        return _fitted(flat, phase, phases, max(math.ceil(0.5 * samples) - 1, 1))
     cell = np.minimum((phase * phases).astype(np.int64), phases - 1)
     count = np.bincount(cell, minlength=phases)
     shape = np.bincount(cell, flat, phases) / np.maximum(count, 1)
     known = np.flatnonzero(count)
     shape = np.interp(np.arange(phases), known, shape[known], period=phases)
-    rest = float(np.sum((flat - shape[cell]) ** 2)) / max(len(flat) - len(known), 1)
-    whole = float(np.sum((flat - np.mean(flat)) ** 2)) / max(len(flat) - 1, 1)
-    scatter, seen = math.sqrt(min(rest, noise(flat) ** 2) * len(known) / len(flat)), shape[known]
+    explained, rest = _explained(flat, shape[cell], len(known))
+    seen = shape[count > 0.5 * np.mean(count[known])]  # of few samples a mean is noise
+    scatter = math.sqrt(min(rest, noise(flat) ** 2) * len(seen) / len(flat))
     size = float(np.ptp(seen)) - _luck(np.max(seen) - seen, scatter) - _luck(seen - np.min(seen), scatter)
-    return _Folded(shape, max(size, 0.0), max(0.0, 1.0 - rest / whole) if whole > 0.0 else 0.0)
+    return _Folded(shape, max(size, 0.0), explained)
+
+
+def _fitted(flat: Numbers, phase: Numbers, phases: int, number: int) -> _Folded:
+    """The harmonics nearest to a signal with few samples in a cycle, all of which may miss its peak."""
+    turn = 2j * math.pi * np.arange(number + 1)
+    waves = [np.exp(np.outer(at, turn)) for at in (phase, np.arange(phases) / phases)]
+    here, whole = (np.hstack([one.real, one.imag[:, 1:]]) for one in waves)
+    parts = np.linalg.lstsq(here, flat)[0]
+    shape = whole @ parts
+    return _Folded(shape, float(np.ptp(shape)), _explained(flat, here @ parts, len(parts))[0])
+
+
+def _explained(flat: Numbers, fit: Numbers, free: int) -> tuple[float, float]:
+    """Part of the variance that a fit of so many numbers explains beyond chance, and the variance of the rest."""
+    rest = float(np.sum((flat - fit) ** 2)) / max(len(flat) - free, 1)
+    whole = float(np.sum((flat - np.mean(flat)) ** 2)) / max(len(flat) - 1, 1)
+    return max(0.0, 1.0 - rest / whole) if whole > 0.0 else 0.0, rest
 
 
 def _luck(below: Numbers, scatter: float) -> float:

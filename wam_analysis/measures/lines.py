@@ -18,11 +18,11 @@ class SpectralLine(NamedTuple):
 
 
 def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[SpectralLine]:
-    """The strongest lines of a spectrum, and the strongest within two octaves, as of a vibration next to a slow motion.
+    """The strongest lines of a spectrum, and of those about a line that is the strongest within two octaves.
 
-    A line is a maximum of the Hann periodogram that noise does not explain whose power is a power of the frequency
-    among the neighbours, so that drift is none.  Its frequency is that of a parabola through the logarithms of three
-    bins.
+    The latter are as of a vibration next to a slow motion.  A line is a maximum of the Hann periodogram that noise does
+    not explain whose power is a power of the frequency among the neighbours, so that drift is none.  Its frequency is
+    that of a parabola through the logarithms of three bins.
 
     Parameters
     ----------
@@ -41,17 +41,24 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[Spect
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     sure = math.log(n / 2) + CYCLE.sure_line
     found: list[SpectralLine] = []
+    groups: list[int] = []
+
+    def strongest(row: int) -> int:
+        return row // CYCLE.apart + int(np.argmax(power[row // CYCLE.apart : row * CYCLE.apart]))
+
     free = np.ones(len(power), np.bool_)  # of stronger lines, whose power is no noise
     for k in peaks[np.argsort(-power[peaks])].tolist():
         is_clear = not found or (len(found) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
-        is_drift = k < CYCLE.episode_cycles
-        if not (is_drift or is_clear or power[k] == np.max(power[k // CYCLE.apart : k * CYCLE.apart])):
+        is_drift, near = k < CYCLE.episode_cycles, strongest(k)
+        is_near = groups.count(near) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * amplitude[near]
+        if not (is_drift or is_clear or (is_near and strongest(near) == near)):
             continue
         if power[k] < sure * max(_nearest(levels, free, k), _noise(levels, free, k)):
             continue
         free[max(k - CYCLE.lobe, 0) : k + CYCLE.lobe + 1] = False
         if is_drift:
             continue
+        groups.append(near)
         frequency = top(levels, k) * spacing
         back = np.exp(-2j * np.pi * frequency * even)
         kept = np.interp(even, stamps, np.exp(2j * np.pi * frequency * stamps))

@@ -153,6 +153,17 @@ def without_turns(
     return kept
 
 
+def count(value: Numbers) -> float:
+    """The smallest change from sample to sample, as a count of an encoder; rounding apart, infinite without one."""
+    return smallest(np.diff(value), float(np.ptp(value))) if len(value) else math.inf
+
+
+def smallest(changes: Numbers, reach: float) -> float:
+    """The size of the smallest change of a signal of some reach that is no rounding; infinite without one."""
+    sizes = np.abs(changes)
+    return float(np.min(sizes[sizes > STREAM.rounding * reach], initial=math.inf))
+
+
 def held_over(value: Numbers) -> Mask:
     """Which samples only repeat the one before, where a signal changes in every second message at most, and evenly.
 
