@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 Bytes = NDArray[np.uint8]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-Names = NDArray[np.str_]
 Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Texts = NDArray[np.object_]

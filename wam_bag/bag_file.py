@@ -81,16 +81,24 @@ def _damaged(path: Path, error: Exception) -> BagError:
 @contextmanager
 def opened(path: Path) -> Iterator[BagFile]:
     """An open file of a bag; errors of it in the context become a BagError."""
+    is_other = path.is_dir() or path.suffix in SUFFIXES
     try:
-        with RosbagsFile(path) if path.is_dir() or path.suffix in SUFFIXES else McapFile(path) as file:
+        with RosbagsFile(path) if is_other else McapFile(path) as file:
             file.open()
             yield file
     except BagError:
         raise
     except OSError as error:
         raise BagError(f"{path} cannot be read: {error.strerror or error}") from error
-    except BROKEN as error:
-        raise BagError(_explain(path, error)) from error
+    except Exception as error:
+        if is_other:
+            raise BagError(
+                f"{path} cannot be read by rosbags: {error}; if it was cut off, repair it by 'rosbag reindex' "
+                "(.bag) or 'sqlite3 FILE .recover' (.db3)"
+            ) from error
+        if isinstance(error, BROKEN):
+            raise BagError(_explain(path, error)) from error
+        raise
 
 
 def _explain(path: Path, error: Exception) -> str:

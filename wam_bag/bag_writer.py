@@ -186,13 +186,11 @@ class BagWriter:
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Add a file to the bag, without a time, so that equal runs give equal bags."""
         with self._closing_on_failure():
-            self._writer.flush()
             self._writer.attach(Attachment(0, 0, name, media_type, data))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add a metadata record."""
         with self._closing_on_failure():
-            self._writer.flush()
             self._writer.metadata(name, values)
 
     @property

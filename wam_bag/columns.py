@@ -158,16 +158,13 @@ class Collector:
 
     def columns(self, label: str) -> Columns:
         """All messages in the order of log times; the label names bag and topic in later errors."""
-        times = np.concatenate(self._times) if self._times else np.empty(0, np.int64)
-        order = None if (np.diff(times) >= 0).all() else np.argsort(times, kind="stable")
-        groups, data = self._groups, self._data
-        if order is not None:
-            times, rank = times[order], np.argsort(order)
-            groups = [(rank[rows], values) for rows, values in groups]
-            data = [data[i] for i in order] if data else data
+        times = np.concatenate([np.empty(0, np.int64), *self._times])
+        order = np.argsort(times, kind="stable")
+        times, rank = times[order], np.argsort(order)
         if self._columned is None:
-            return Messages(times, Decoded(data, self.kind.decode, label))
+            return Messages(times, Decoded([self._data[i] for i in order], self.kind.decode, label))
         _, assemble = self._columned
+        groups = [(rank[rows], values) for rows, values in self._groups]
         groups.sort(key=lambda group: int(group[0].min()))
         try:
             return assemble(times, [(_where(rows), values) for rows, values in groups])

@@ -29,9 +29,9 @@ class NotClosedError(Damage):
     """A file that was not finished."""
 
 
-def command(words: str, path: Path | str, options: str = "") -> str:
+def command(words: str, path: Path | str) -> str:
     """A command on a path as the reader of a message can copy it, in quotes."""
-    text = f"{words} {shlex.quote(str(path))} {options}".rstrip()
+    text = f"{words} {shlex.quote(str(path))}"
     return f'"{text}"' if "'" in text else f"'{text}'"
 
 

@@ -12,8 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import zstandard
@@ -28,8 +27,7 @@ from wam_bag.mcap_records import (
     FOOTER,
     FOOTER_SIZE,
     HEAD,
-    LARGEST_ATTACHMENT,
-    LARGEST_CHUNK,
+    LARGEST,
     MAGIC,
     MESSAGE,
     ChunkPlace,
@@ -59,7 +57,7 @@ class MessageCounts(NamedTuple):
     by_channel: dict[int, int]
 
 
-class BagFile:
+class BagFile(contextlib.ExitStack):
     """An open file of a bag, or a bag that is no MCAP; a context manager.
 
     Parameters
@@ -79,20 +77,12 @@ class BagFile:
     """
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: MessageCounts | None = None
         self.loaded = MessageCounts(0, 0, {})
-        self._stack = contextlib.ExitStack()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stack.close()
 
     def open(self) -> None:
         """Find the parts of a closed file."""
@@ -144,9 +134,7 @@ class McapFile(BagFile):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         with path.open("rb") as stream:
-            self._data: bytes | mmap.mmap = self._stack.enter_context(
-                mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-            )
+            self._data: bytes | mmap.mmap = self.enter_context(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
         self.size = len(self._data)
         self._blocks: list[ChunkPlace] = []
         self._others: list[RecordExtent] = []  # attachments and metadata
@@ -199,7 +187,7 @@ class McapFile(BagFile):
         """The whole records of a chunk that breaks off at the end; from then on, places are in it, decompressed."""
         if not self.has_end() and self._data[position] == Opcode.CHUNK:
             chunk = Chunk.read(ReadDataStream(BytesIO(self._data[position + HEAD.size :])))
-            self._data = expanded(chunk, LARGEST_CHUNK, self._zstd)
+            self._data = expanded(chunk, LARGEST, self._zstd)
             self.size = len(self._data)
             yield from walk(self._data, 0, self.size)
 
@@ -242,10 +230,9 @@ class McapFile(BagFile):
         """See `BagFile.records`."""
         found = [one for one in self._others if one.opcode == opcode]
         for _, start, end in found:
-            if end - start > LARGEST_ATTACHMENT:
+            if end - start > LARGEST:
                 raise TooLargeError(
-                    f"the {opcode.name.lower()} at byte {start} has {end - start} bytes; at most {LARGEST_ATTACHMENT} "
-                    "are read"
+                    f"the {opcode.name.lower()} at byte {start} has {end - start} bytes; at most {LARGEST} are read"
                 )
         return [parsed(opcode, self.content(record)) for record in found]
 

@@ -27,12 +27,11 @@ MESSAGE: Final = struct.Struct("<BQHIQQ")  # start of a message: opcode, length,
 FIRST_PRIVATE: Final = 0x80  # opcodes from here on belong to applications and are skipped
 FOOTER: Final = struct.Struct("<QQI")  # content: start of the summary, of its offsets, checksum
 FOOTER_SIZE: Final = HEAD.size + FOOTER.size
-LARGEST_CHUNK: Final = 2**28  # bytes, decompressed
-LARGEST_ATTACHMENT: Final = 2**28  # bytes
+LARGEST: Final = 2**28  # bytes of a chunk, decompressed, or of an attachment
 _CLASSES: Final[dict[int, Any]] = {
-    Opcode.HEADER: records.Header, Opcode.SCHEMA: records.Schema, Opcode.CHANNEL: records.Channel,
+    Opcode.SCHEMA: records.Schema, Opcode.CHANNEL: records.Channel,
     Opcode.ATTACHMENT: records.Attachment, Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
-    Opcode.CHUNK: records.Chunk, Opcode.CHUNK_INDEX: records.ChunkIndex, Opcode.MESSAGE_INDEX: records.MessageIndex,
+    Opcode.CHUNK: records.Chunk, Opcode.CHUNK_INDEX: records.ChunkIndex,
     Opcode.STATISTICS: records.Statistics, Opcode.METADATA: records.Metadata,
     Opcode.METADATA_INDEX: records.MetadataIndex,
 }  # fmt: skip
@@ -128,9 +127,9 @@ def chunk_index(content: bytes) -> ChunkPlace:
 
 def checked(place: ChunkPlace) -> ChunkPlace:
     """The same; raises TooLargeError if it would take too much memory."""
-    if place.size > LARGEST_CHUNK:
+    if place.size > LARGEST:
         raise TooLargeError(
-            f"the chunk at byte {place.start} is to hold {place.size} bytes; chunks of at most {LARGEST_CHUNK} are read"
+            f"the chunk at byte {place.start} is to hold {place.size} bytes; chunks of at most {LARGEST} are read"
         )
     return place
 

@@ -116,7 +116,8 @@ class McapWriter:
             self.counts[channel] = self.counts.get(channel, 0) + len(entries) // 2
 
     def attach(self, attachment: records.Attachment) -> None:
-        """Write an attachment."""
+        """Write an attachment, behind the messages before it."""
+        self.flush()
         data = serialized(attachment)
         self._put(data)
         index = records.AttachmentIndex(
@@ -126,7 +127,8 @@ class McapWriter:
         self._summarize(Opcode.ATTACHMENT_INDEX, index)
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record."""
+        """Write a metadata record, behind the messages before it."""
+        self.flush()
         data = serialized(records.Metadata(name, dict(values)))
         self._put(data)
         self._summarize(Opcode.METADATA_INDEX, records.MetadataIndex(self.position - len(data), len(data), name))

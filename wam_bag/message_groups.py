@@ -77,7 +77,7 @@ class Known(NamedTuple):
 
     def fits(self, words: Words) -> Mask:
         """Which rows are of this layout."""
-        return np.asarray(((words & self.mask) == self.want).all(axis=1), np.bool_)
+        return ((words & self.mask) == self.want).all(axis=1)
 
 
 class Grouping:
@@ -94,7 +94,7 @@ class Grouping:
 
     def __call__(self, buffer: Bytes, starts: Rows, sizes: Rows) -> Iterator[Group]:
         """Groups of the messages that begin at these places of a buffer and have these sizes."""
-        for size in [int(sizes[0])] if len(sizes) and (sizes == sizes[0]).all() else np.unique(sizes).tolist():
+        for size in np.unique(sizes).tolist():
             rows = np.flatnonzero(sizes == size)
             words = at(buffer, starts[rows] - BEFORE, f"V{8 * _words(size)}").view(np.uint64).reshape(len(rows), -1)
             tried = iter([known for known in self._known if known.size == size])

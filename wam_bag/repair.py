@@ -169,15 +169,12 @@ class _Copy:
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             file.define(opcode, file.content(record))
         elif opcode == Opcode.ATTACHMENT:
-            attachment = parsed(opcode, file.content(record))
-            writer.flush()
-            writer.attach(attachment)
+            writer.attach(parsed(opcode, file.content(record)))
         elif opcode == Opcode.METADATA:
             metadata = parsed(opcode, file.content(record))
             if metadata.name == REPAIRED:
                 self._earlier |= metadata.metadata
                 return
-            writer.flush()
             writer.metadata(metadata.name, metadata.metadata)
 
     def _add(self, messages: Sequence[Message]) -> None:

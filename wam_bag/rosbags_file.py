@@ -2,7 +2,6 @@
 
 import importlib
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Any, Final
 
 from mcap.records import Channel, Schema
@@ -16,17 +15,7 @@ SUFFIXES: Final = (".bag", ".db3")
 
 
 class RosbagsFile(BagFile):
-    """A bag that rosbags reads, see `BagFile`; its errors are BagErrors."""
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        super().__exit__(kind, value, trace)
-        if isinstance(value, Exception) and not isinstance(value, (BagError, OSError)):
-            raise BagError(
-                f"{self.path} cannot be read by rosbags: {value}; if it was cut off, repair it by 'rosbag reindex' "
-                "(.bag) or 'sqlite3 FILE .recover' (.db3)"
-            ) from value
+    """A bag that rosbags reads, see `BagFile`; it raises whatever rosbags does."""
 
     def open(self) -> None:
         """List the topics."""
@@ -38,7 +27,7 @@ class RosbagsFile(BagFile):
             ) from None
         store = rosbags.get_typestore(importlib.import_module("rosbags.typesys").Stores.ROS2_HUMBLE)
         # where the bag defines no types
-        reader = self._stack.enter_context(rosbags.AnyReader([self.path], default_typestore=store))
+        reader = self.enter_context(rosbags.AnyReader([self.path], default_typestore=store))
         self._reader, encoding = reader, CDR if reader.is2 else ROS1
         for one in reader.connections:
             is_known = one.msgtype in reader.typestore.fielddefs

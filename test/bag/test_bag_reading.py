@@ -35,7 +35,7 @@ from wam_bag.bag import (
     read,
 )
 from wam_bag.limits import READING_LIMITS
-from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC
+from wam_bag.mcap_records import LARGEST, MAGIC
 from wam_bag.repair import repair
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
@@ -346,7 +346,7 @@ def test_a_small_file_that_decompresses_to_much_is_refused_and_left_as_it_is(tmp
         writer = Writer(stream)
         writer.start(profile="ros2")
         channel = writer.register_channel("/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", text))
-        writer.add_message(channel, 1, bytes(LARGEST_CHUNK), 1)
+        writer.add_message(channel, 1, bytes(LARGEST), 1)
         writer.finish()
     before = path.read_bytes()
     assert len(before) < 100_000
@@ -366,7 +366,7 @@ def test_an_attachment_that_is_too_large_is_refused(tmp_path: Path) -> None:
     start = data.index(content) - data[: data.index(content)][::-1].index(b"\x09") - 1
     assert data[start] == Opcode.ATTACHMENT
     del data[start:]
-    extra = LARGEST_ATTACHMENT
+    extra = LARGEST
     with path.open("wb") as stream:  # a sparse file: it takes no space on disk
         stream.write(data)
         stream.write(struct.pack("<BQ", Opcode.ATTACHMENT, extra))
