@@ -11,7 +11,7 @@ from wam_analysis.held_messages import held_rows, step_at
 from wam_analysis.measures.runs import runs
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import HYPOTHESIS, NAN, ForceSignal, Traces, most_probable
-from wam_bag.arrays import Mask, Names, Numbers, Times
+from wam_bag.arrays import Mask, Numbers, Texts, Times
 from wam_description.event_text import REASONS
 from wam_sim.recorded_run import RecordedRun, RecordedStep
 
@@ -189,7 +189,7 @@ def contact_rows(stamp: Times, acts: Mask) -> list[tuple[int, int]]:
     return contacts
 
 
-def most(names: Names) -> str:
+def most(names: Texts) -> str:
     """The name that is there most often, NO_LINK without any."""
     return Counter(names.tolist()).most_common(1)[0][0] if len(names) else NO_LINK
 

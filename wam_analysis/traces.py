@@ -8,10 +8,10 @@ import numpy as np
 from wam_analysis.held_messages import held_of, held_rows, joint_angles, with_holes
 from wam_analysis.holds import Hold
 from wam_analysis.thresholds import TOUCH
-from wam_bag.arrays import Mask, Names, Numbers, Times
+from wam_bag.arrays import Mask, Numbers, Texts, Times
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE
+from wam_description.signals import BASE, NO_CONTACT, Contact
 from wam_sim.recorded_run import RecordedRun
 
 NAN = float("nan")
@@ -31,7 +31,7 @@ class ForceSignal(NamedTuple):
     is_placed : (k,), whether a position was recorded, be it NaN.
     """
 
-    frame: Names
+    frame: Texts
     force: Numbers
     position: Numbers
     is_placed: Mask
@@ -55,6 +55,14 @@ class ForceSignal(NamedTuple):
     def is_lower_bound(self) -> Mask:
         """Whether an estimated force is the least one that explains the torques, (k,): its position is unknown."""
         return self.acts & self.is_placed & np.isnan(self.position)
+
+    def contact(self, row: int) -> Contact:
+        """The force at an instant on its link; none where it is not known, or has no link."""
+        force = self.force[row]
+        if not np.all(np.isfinite(force)) or not np.any(force) or self.frame[row] in ("", BASE):
+            return NO_CONTACT
+        x, y, z = force.tolist()
+        return Contact(str(self.frame[row]), float(self.position[row]), (x, y, z))
 
     def unknown(self, rows: Mask) -> "ForceSignal":
         """The same without its values in some rows, (k,)."""
@@ -148,14 +156,14 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold]) -> Trace
         forces = run.wrench(wrench)
         position, is_placed = np.full(len(base), NAN), np.zeros(len(base), bool)
         if forces is None:
-            return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), position, is_placed)
+            return ForceSignal(np.full(len(base), "", object), np.full((len(base), 3), NAN), position, is_placed)
         row, known = held_rows(forces.stamp_ns, base, held_of(run, wrench))
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
         if (placed := _positions(run, point)) is not None:
             at, is_there = held_rows(placed[0], base)
             is_placed = is_there & known & (placed[0][at] == forces.stamp_ns[row])
             position[is_placed] = placed[1][at[is_placed]]
-        return ForceSignal(np.array(forces.frames, np.str_)[row], force, position, is_placed)
+        return ForceSignal(np.array(forces.frames, object)[row], force, position, is_placed)
 
     base = np.empty(0, np.int64)
     for name in ("sim/contact/wrench", "contact/wrench", "force_command"):
@@ -169,9 +177,9 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold]) -> Trace
     covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
     for task in tasks:
         rows = (base >= task.begin) & (base < task.end) & (task.axis < 0)
-        frames, forces = commanded.frame.astype(object), commanded.force.copy()
+        frames, forces = commanded.frame.copy(), commanded.force.copy()
         frames[rows], forces[rows], covers[rows] = task.frame, task.force, task.cover
-        commanded = commanded._replace(frame=frames.astype(np.str_), force=forces)
+        commanded = commanded._replace(frame=frames, force=forces)
     if arm is not None:
         commanded, measured = _on_links(run, arm, base, (commanded, measured), covers)
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
@@ -201,18 +209,18 @@ def most_probable(run: RecordedRun) -> tuple[Times, dict[str, Numbers]] | None:
     return columns.row_stamp_ns[first], {name: columns.columns[name][first] for name in HYPOTHESIS}
 
 
-def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
+def _controlled(run: RecordedRun, base: Times, touched: Texts) -> Texts:
     """The cover on which the force loop controls the force at each instant, (k,); where unknown, what is touched."""
     columns = run.table("force_axis")
     if columns is None:
-        return np.asarray(touched.astype(object))
+        return touched
     row, known = held_rows(columns.stamp_ns, base)
     frames = np.array(columns.frames, object)[row]
-    return np.asarray(np.where(known & (frames != BASE), frames, touched), object)
+    return np.where(known & (frames != BASE), frames, touched)
 
 
 def _on_links(
-    run: RecordedRun, arm: Arm, base: Times, signals: tuple[ForceSignal, ForceSignal], covers: Names
+    run: RecordedRun, arm: Arm, base: Times, signals: tuple[ForceSignal, ForceSignal], covers: Texts
 ) -> tuple[ForceSignal, ForceSignal]:
     """Signals whose forces in the base frame are given in those of some covers, (k,), if the first signal acts."""
     rows = np.flatnonzero((signals[0].frame == BASE) & signals[0].acts)
@@ -225,9 +233,9 @@ def _on_links(
     rotations = [body.cover_pose(one, cover).rotation.T for one, cover in zip(q, covers[rows].tolist(), strict=True)]
     found: list[ForceSignal] = []
     for signal in signals:
-        frame, force = signal.frame.astype(object), signal.force.copy()
+        frame, force = signal.frame.copy(), signal.force.copy()
         of_base = signal.frame[rows] == BASE
         turned = np.einsum("kij,kj->ki", np.reshape(rotations, (-1, 3, 3)), signal.force[rows])
         frame[rows[of_base]], force[rows[of_base]] = covers[rows[of_base]], turned[of_base]
-        found.append(signal._replace(frame=frame.astype(np.str_), force=force))
+        found.append(signal._replace(frame=frame, force=force))
     return found[0], found[1]

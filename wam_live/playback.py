@@ -12,10 +12,9 @@ import numpy as np
 from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.traces import ForceSignal
 from wam_bag.bag import TableColumns
 from wam_control.contact.contact_table import contact_of, likely_of
-from wam_description.signals import BASE, NO_CONTACT, Contact, Table
+from wam_description.signals import NO_CONTACT, Contact, Table
 from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import Controls
 from wam_live.scene import Scene
@@ -73,7 +72,7 @@ class BagSource:
         return Snapshot(
             stamp=stamp,
             q=tuple(self._angles[at].tolist()),
-            true=self._contact(traces.true, row) if known else NO_CONTACT,
+            true=traces.true.contact(row) if known else NO_CONTACT,
             estimated=contact_of(hypotheses, self._covers) if self._hypotheses else self._alone(row),
             likely=likely_of(hypotheses, self._covers),
             commanded=float(traces.commanded.size[row]) if known else NAN,
@@ -93,15 +92,7 @@ class BagSource:
         A contact without one is shown as one whose position cannot be observed.
         """
         signal = self._traces.estimated
-        return self._contact(signal, row) if row >= 0 and signal.is_placed[row] else NO_CONTACT
-
-    @staticmethod
-    def _contact(signal: ForceSignal, row: int) -> Contact:
-        force = signal.force[row]
-        if not np.all(np.isfinite(force)) or not np.any(force) or signal.frame[row] in ("", BASE):
-            return NO_CONTACT
-        x, y, z = force.tolist()
-        return Contact(str(signal.frame[row]), float(signal.position[row]), (x, y, z))
+        return signal.contact(row) if row >= 0 and signal.is_placed[row] else NO_CONTACT
 
 
 def play(recording: AnalysedRecording, port: int, until: Callable[[], bool], notify: Callable[[str], None]) -> None:

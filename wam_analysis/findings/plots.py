@@ -5,7 +5,6 @@ import math
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
@@ -15,7 +14,6 @@ from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
-from wam_description.signals import Contact
 from wam_sim.reactions import steady_begin
 
 
@@ -33,9 +31,8 @@ def arm_plot(recording: AnalysedRecording) -> tuple[str, bytes] | None:
         (traces.true, TRUE, "true", 4.2),  # visible under a correct estimate
         (traces.estimated, ESTIMATED, "estimated", 1.3),
     ):
-        x, y, z = signal.force[row].tolist()
-        contact = Contact(str(signal.frame[row]), float(signal.position[row]), (x, y, z))
-        if signal.acts[row] and contact.cover in arm.covers.names and math.isfinite(contact.position):
+        contact = signal.contact(row)
+        if contact.cover in arm.covers.names and math.isfinite(contact.position):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
             ends = np.array([point, point + LAYOUT.metres_per_newton * force])
             arrows.append((ends, colour, f"{label} {np.linalg.norm(force):.1f} N", width))
@@ -45,7 +42,6 @@ def arm_plot(recording: AnalysedRecording) -> tuple[str, bytes] | None:
     stream = io.BytesIO()
     with mpl.rc_context({**STYLE, "svg.fonttype": "path", "svg.hashsalt": "wam"}):
         figure = Figure(figsize=LAYOUT.arm)
-        FigureCanvasAgg(figure)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         arm_picture.draw(axes, shown, view)
         for ends, colour, label, width in arrows:

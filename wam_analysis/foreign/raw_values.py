@@ -159,8 +159,6 @@ def _spikes(value: Numbers, least: float) -> Index:
     away = np.fmax(0.0, np.fmax(np.minimum(there, back), np.minimum(-there, -back)))
     around = np.abs(np.pad(steps, 1))
     away[np.minimum(around[:-3], around[3:]) >= away] = 0.0
-    if len(away) < SHAFT.fewest_samples:
-        return np.zeros(0, np.int64)
     ends = STREAM.repeated, 1.0 - STREAM.repeated
     reach = np.ptp(np.nanquantile(value, ends))
     return np.flatnonzero(away > max(reach, least, STREAM.zero * np.quantile(away, ends[1]))) + 1

@@ -133,7 +133,7 @@ class Source(NamedTuple):
 def _known(source: Source, values: Mapping[str, Numbers]) -> Mask:
     """Which messages have all of some values."""
     nothing = np.full(len(source.time), 0.0 if values else math.nan)
-    return np.asarray(np.isfinite(np.column_stack([nothing, *values.values()])).all(axis=1), np.bool_)
+    return np.isfinite(np.column_stack([nothing, *values.values()])).all(axis=1)
 
 
 def _between(time: Numbers, value: Numbers) -> Numbers:

@@ -101,7 +101,7 @@ def motion(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotionSamples:
     time, angles, torque, is_used = _evenly(stamps, theta, effort)
     period = float(time[1] - time[0])
     half = max(2, round(0.5 * IDENTIFY.window / period))
-    angle, rate, acceleration = _cubic(half, period)
+    weights = _cubic(half, period)
     step = max(1, round(IDENTIFY.thinning * 2 * half))
     centres = np.arange(2 * half, len(time) - 2 * half, step)
     spans = centres[:, None] + np.arange(-2 * half, 2 * half + 1)
@@ -112,19 +112,18 @@ def motion(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotionSamples:
             f"identification needs {IDENTIFY.shortest:g} s or more"
         )
     windows = centres[:, None] + np.arange(-half, half + 1)
-    torques = _smoothed(torque, angle)
+    torques = _smoothed(torque, weights[0])
     # the velocity at each state: also from angles, because that of an encoder is a difference of counts
-    velocities = _smoothed(angles, rate)
-    spread = angles[windows]
+    turned, velocities, accelerations = (_smoothed(angles, each) for each in weights)
     return MotionSamples(
         time[centres],
-        np.einsum("w,kwn->kn", angle, spread),
-        np.einsum("w,kwn->kn", rate, spread),
-        np.einsum("w,kwn->kn", acceleration, spread),
-        np.einsum("w,kwn->kn", angle, torque[windows]),
+        turned[centres],
+        velocities[centres],
+        accelerations[centres],
+        torques[centres],
         velocities[windows],
         torques[windows],
-        angle,
+        weights[0],
     )
 
 

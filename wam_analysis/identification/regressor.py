@@ -71,11 +71,10 @@ class Regressor:
 
     def _steady(self) -> Mask:
         """(k, n), whether a motor and its joints turn in one direction during the window."""
-        v, qd = self._motion.velocities, self._qd
-        motor = np.abs(v).min(1) > IDENTIFY.slowest_motor
-        motor &= np.abs(np.sign(v).sum(1)) == v.shape[1]
-        joint = np.abs(qd).min(1) > IDENTIFY.slowest_joint
-        joint &= np.abs(np.sign(qd).sum(1)) == v.shape[1]
+        motor, joint = (
+            (each.min(1) > least) | (each.max(1) < -least)
+            for each, least in ((self._motion.velocities, IDENTIFY.slowest_motor), (self._qd, IDENTIFY.slowest_joint))
+        )
         return motor & ~(~joint @ (self._matrix != 0.0))
 
     def equations(self, values: Numbers) -> Equations:
@@ -107,7 +106,7 @@ class Regressor:
         static = [f"motors.static_{way}" for way in DIRECTIONS]
         rise = sum(friction[group] * values[self.unknowns.places(group)] for group in static)
         slow = values[self.unknowns.places("motors.stribeck_velocity")]
-        return np.asarray(2.0 * rise * self._motion.velocities**2 / slow**3, np.float64)
+        return 2.0 * rise * self._motion.velocities**2 / slow**3
 
     def _friction(self, load: Numbers, values: Numbers) -> dict[str, Numbers]:
         """Torque per parameter that it is linear in at each state, (k, w, n), by group."""
@@ -160,7 +159,7 @@ class Regressor:
         found = np.zeros(load.shape)
         for group, each in self._friction(load, values).items():
             found += (carrying[group] - each) * values[unknowns.places(group)]
-        return np.asarray(np.einsum("w,kwn->kn", self._motion.weights, found), np.float64)
+        return np.einsum("w,kwn->kn", self._motion.weights, found)
 
     def _at_joints(self, load: Numbers) -> Numbers:
         """Size of the torque that the cables transmit to each joint at each state, (k, w, n), N m."""
@@ -178,7 +177,7 @@ class Regressor:
     @property
     def payload_torque(self) -> Numbers:
         """Torques of the motors, (k, n), by 1 kg at the tool, N m/kg."""
-        return np.asarray(self._links[:, :, -10:] @ self._at_tool, np.float64)
+        return self._links[:, :, -10:] @ self._at_tool
 
     def _inertial(self, values: Numbers) -> tuple[list[int], Numbers, Numbers]:
         """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""

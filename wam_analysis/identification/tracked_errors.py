@@ -40,13 +40,13 @@ class Uncertainty(NamedTuple):
     def variances(self, combinations: Numbers) -> Numbers:
         """Those of linear combinations, (t, p), of the parameters, (t,)."""
         white, law = (((combinations @ each) * combinations).sum(1) for each in (self.white, self.law))
-        return np.asarray(white * self._times(combinations, white) + law, np.float64)
+        return white * self._times(combinations, white) + law
 
     def covariance(self, combinations: Numbers) -> Numbers:
         """That of linear combinations, (t, p), of the parameters, (t, t)."""
         white = combinations @ self.white @ combinations.T
         unit = np.sqrt(self._times(combinations, white.diagonal()))
-        return np.asarray(white * np.outer(unit, unit) + combinations @ self.law @ combinations.T, np.float64)
+        return white * np.outer(unit, unit) + combinations @ self.law @ combinations.T
 
     def _times(self, combinations: Numbers, white: Numbers) -> Numbers:
         """How many times the white variances, (t,), those of the combinations are."""

@@ -229,7 +229,7 @@ def _undetermined(products: Numbers) -> Mask:
     sizes = np.sqrt(np.maximum(np.diag(products), 1e-300))
     values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
     free = vectors[:, values < values[-1] / SHAFT.singular]
-    return np.asarray(np.any(np.abs(free) > SHAFT.undetermined, axis=1), np.bool_)
+    return np.any(np.abs(free) > SHAFT.undetermined, axis=1)
 
 
 def _halves(rows: Index) -> Rows:

@@ -35,7 +35,7 @@ def usual_steps(steps: Numbers) -> Numbers:
     is_even = np.mean(np.abs(parts - own) <= STREAM.pace * own, axis=1) >= STREAM.evenly
     near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
     slowest = np.max(sliding_window_view(near, 3), axis=1)
-    return np.asarray(slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)], np.float64)
+    return slowest[np.minimum(np.arange(len(steps)) // STREAM.steps, number - 1)]
 
 
 def missed(times: Times, periods: Numbers) -> float:
