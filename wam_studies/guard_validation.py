@@ -157,8 +157,7 @@ def _random_node(random: np.random.Generator) -> tuple[FrictionNode, IntegralLoo
 
 def _exact_end(node: FrictionNode, loop: IntegralLoop, step: float, velocity: float) -> str:
     """End of the response to a step of the force or to an initial velocity, given as force of the contact, N m."""
-    frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
-    speed = velocity / node.contact_stiffness * frequency
+    speed = velocity / node.contact_stiffness * node.natural_frequency
     for events in LIMITS.events:
         found = assess(node, loop, step, start=(0.0, speed, 0.0), max_events=events)
         if found.verdict is not Verdict.UNDECIDED:

@@ -150,5 +150,4 @@ def evaluate(
 
 def load(name: str) -> type[Study[Any, Any]]:
     """The class of a study."""
-    found: type[Study[Any, Any]] = resolve_name(STUDIES[name])
-    return found
+    return resolve_name(STUDIES[name])

@@ -13,7 +13,8 @@ from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_studies.figures.backdrivability import Backdriving
-from wam_theory.cable import efficiency, stage_loss, tensions
+from wam_studies.plant.ideal_testbed import limiting_efficiency
+from wam_theory.cable import tensions
 from wam_theory.requisites import TOLERANCE, Measures, Requisite, scorecard
 from wam_theory.resonance import (
     best_contact_stiffness,
@@ -83,7 +84,7 @@ def measures(configuration: Configuration) -> Measures:
         aspect_ratio=aspect_ratios(arm),
         aspect_required=(*printed("aspect ratio of the inner link"), *printed("aspect ratio of the outer link")),
         cover_friction=min(driver.world.obstacles.friction),
-        efficiency=min(_efficiency(arm, i) for i in range(len(arm.motors.names))),
+        efficiency=min(limiting_efficiency(arm, torque, i) for i, torque in enumerate(arm.motors.peak_torque)),
         efficiency_required=printed("least limiting efficiency at full torque")[0],
     )
 
@@ -160,15 +161,6 @@ def aspect_ratios(arm: Arm) -> tuple[float, ...]:
     tube = np.linalg.norm(np.subtract(arm.covers.end[3:], arm.covers.start[3:])) + 2.0 * arm.covers.radius[1]
     inner_width = max(hole, 2.0 * arm.covers.radius[0])
     return arm.covers.length[0] / inner_width, float(tube) / (2.0 * arm.covers.radius[1])
-
-
-def _efficiency(arm: Arm, motor: int) -> float:
-    """Limiting efficiency, (6.15), of the stages of one motor at its peak torque."""
-    cables = arm.cables
-    stages = [k for k, name in enumerate(cables.stage_motors) if name == arm.motors.names[motor]]
-    columns = (cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio)
-    radius, ea, circuits, ratio = ([column[k] for k in stages] for column in columns)
-    return efficiency(stage_loss(arm.motors.peak_torque[motor], radius, ea, circuits, ratio))
 
 
 def table(rows: tuple[Requisite, ...]) -> str:

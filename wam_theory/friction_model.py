@@ -49,6 +49,11 @@ class FrictionNode:
             require(name, getattr(self, name), at_least=0.0)
         require("static_friction", self.static_friction, at_least=self.dynamic_friction)
 
+    @property
+    def natural_frequency(self) -> float:
+        """Without damping, between transmission and contact, rad/s."""
+        return math.sqrt((self.transmission_stiffness + self.contact_stiffness) / self.inertia)
+
 
 @dataclass(frozen=True, slots=True)
 class IntegralLoop:

@@ -73,8 +73,7 @@ def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = DESIG
         error = 0.0 if kept_up > DESIGN.cycle_excess * cycle.peak_to_peak else math.inf
         return FrictionVerdict(Domain.I, min(margins), error, error, cycle, kept_up)
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
-    frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
-    if not loop.delay_samples and frequency * loop.sample_period < DESIGN.continuous:
+    if not loop.delay_samples and node.natural_frequency * loop.sample_period < DESIGN.continuous:
         loop = replace(loop, sample_period=0.0)
     errors = [stable_errors(each, loop, events) for each in beyond]
     error, undecided = min(each.stable for each in errors), min(each.undecided for each in errors)
@@ -149,8 +148,7 @@ def _saturated_cycle(node: FrictionNode, loop: IntegralLoop) -> float:
 def _responses(node: FrictionNode, loop: IntegralLoop) -> list[tuple[float, tuple[float, float, float]]]:
     """Steps of F_des, and the state in which they begin: at rest, or thrown at the contact or away from it."""
     limit = loop.error_limit
-    frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
-    thrown = 3.0 * limit / node.contact_stiffness * frequency
+    thrown = 3.0 * limit / node.contact_stiffness * node.natural_frequency
     tries = [(part * limit, (0.0, 0.0, 0.0)) for part in DESIGN.steps]
     return [*tries, (0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
 

@@ -142,5 +142,4 @@ def _truth(played: Played) -> Array:
         return rows
     count = round(RANGES.dither_cycle / (played.moments[1].time - played.moments[0].time))
     before = np.concatenate((np.repeat(rows[:1], count, axis=0), rows)).cumsum(axis=0)
-    mean: Array = (before[count:] - before[:-count]) / count
-    return mean
+    return (before[count:] - before[:-count]) / count

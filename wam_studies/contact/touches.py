@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_description.arm import Arm, Covers
+from wam_studies.identification.plants import log_uniform
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def touches(arm: Arm, random: np.random.Generator, times: Sequence[float], given
         kind = str(random.choice(list(given.kinds), p=shares / sum(given.kinds.values())))
         drawn = _drawn(arm, random, kind, begin, given.of_levels)
         if given.are_lasting:
-            hold = _log_uniform(random, *TOUCHES.lasting)
+            hold = log_uniform(random, *TOUCHES.lasting)
             rise = TOUCHES.slow if random.random() < 0.3 else TOUCHES.rise
             drawn = drawn._replace(end=begin + hold, rise=min(rise, 0.5 * hold))
         found.append(drawn)
@@ -160,7 +161,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
     inner, outer = _neighbours(arm, random)
     size, length = _size(random, of_levels), arm.covers.length_of(outer)
     if kind == PICKING_UP:
-        mass, hold = _log_uniform(random, TOUCHES.lightest, TOUCHES.heaviest), random.choice(TOUCHES.holds_of_mass)
+        mass, hold = log_uniform(random, TOUCHES.lightest, TOUCHES.heaviest), random.choice(TOUCHES.holds_of_mass)
         return Touch(kind, outer, length, begin, begin + float(hold), mass=mass)
     end = begin + TOUCHES.hold
     if kind in ("tip along the tube", "end cap, oblique"):
@@ -189,11 +190,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
 def _size(random: np.random.Generator, of_levels: float) -> float:
     if random.random() < of_levels:
         return float(random.choice(TOUCHES.levels)) * float(random.uniform(0.95, 1.05))
-    return _log_uniform(random, TOUCHES.weakest, TOUCHES.strongest)
-
-
-def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(random.uniform(math.log(low), math.log(high))))
+    return log_uniform(random, TOUCHES.weakest, TOUCHES.strongest)
 
 
 def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin: float) -> Touch:

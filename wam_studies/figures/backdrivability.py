@@ -61,18 +61,17 @@ class Backdriving:
         jacobian = self._body.tool_jacobian(q)
         inertia = self._body.mass_matrix(q) + self._armature + (self.rotors if rotors else 0.0)
         free = jacobian @ np.linalg.solve(inertia, jacobian.T)
-        found: Array = np.asarray(np.linalg.solve(np.eye(3) + payload * free, free), dtype=np.float64)
-        return found
+        return np.asarray(np.linalg.solve(np.eye(3) + payload * free, free), dtype=np.float64)
 
     def masses(self, q: tuple[float, ...], directions: Array, payload: float = 0.0, rotors: bool = True) -> Array:
         """Effective mass, (d,), kg, of the tip along each direction, (d, 3), in a pose q, rad, with a payload, kg."""
         along = np.einsum("di,ij,dj->d", directions, self.mobility(q, payload, rotors), directions)
-        return np.asarray(1.0 / along, dtype=np.float64)
+        return 1.0 / along
 
     def pushes(self, q: tuple[float, ...], directions: Array) -> Array:
         """Greatest push along each direction, (d, 3), that moves no joint, each held by its own friction only, N."""
         levers = np.maximum(np.abs(directions @ self._body.tool_jacobian(q)), 1e-12)
-        return np.asarray((self.friction / levers).min(axis=1), dtype=np.float64)
+        return (self.friction / levers).min(axis=1)
 
     def at(self, q: tuple[float, ...], payload: float) -> Backdriven:
         """What a push at the tip meets in a pose q, rad, with a payload, kg."""

@@ -136,14 +136,12 @@ def open_loop() -> Panels:
 
 
 def _parts() -> Numbers:
-    parts: Numbers = (np.arange(CASE.open_loop_poses) + 0.5) / CASE.open_loop_poses
-    return parts
+    return (np.arange(CASE.open_loop_poses) + 0.5) / CASE.open_loop_poses
 
 
 def _sorted(of: Callable[[tuple[float, ...], Numbers], float], pushes: Pushes, share: float) -> Numbers:
     """Errors or bounds of a share of each force, percent of the largest steady force, the least first."""
-    found: Numbers = np.sort([100.0 * abs(of(q, share * force)) / np.linalg.norm(force) for q, force in pushes])
-    return found
+    return np.sort([100.0 * abs(of(q, share * force)) / np.linalg.norm(force) for q, force in pushes])
 
 
 def _panel(title: str, lines: list[tuple[str, Series]]) -> Panel:

@@ -93,10 +93,6 @@ class Panel(NamedTuple):
         """The line of a label."""
         return dict(self.lines)[label]
 
-    def mark(self, text: str) -> Mark:
-        """The first mark whose text begins so."""
-        return next(mark for mark in self.marks if mark.text.startswith(text))
-
 
 Panels = tuple[Panel, ...]
 

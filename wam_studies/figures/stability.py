@@ -34,14 +34,15 @@ def describing_function() -> Panels:
     -1/N(A) is the negative real axis, b/N(A) = pi/4 b A/F_friction.
     """
     node = equal_node(CASE.unity_zeta)
-    natural = float(np.sqrt(2.0 * node.contact_stiffness / node.inertia))
     omega, points = np.geomspace(0.05, 30.0, 4000), np.array([0.3, 0.6, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0])
     curves = [("-b/N(A)", line_only([-4.4, 0.0], [0.0, 0.0]))]
     for gamma in CASE.gammas:
         ktr, kc = node.transmission_stiffness, node.contact_stiffness
         gain = gamma * float(routh_gain(node.inertia, node.damping, ktr, kc))
-        line = node.damping * friction_to_velocity(1j * natural * omega, gain, node.inertia, node.damping, ktr, kc)
-        plant = node.damping * _measured_response(node, gain, natural * points)
+        line = node.damping * friction_to_velocity(
+            1j * node.natural_frequency * omega, gain, node.inertia, node.damping, ktr, kc
+        )
+        plant = node.damping * _measured_response(node, gain, node.natural_frequency * points)
         curves.append((f"b G(jω), γ = {gamma:g}", Series(line.real, line.imag, plant.real, plant.imag)))
     cycle = Mark("unstable limit cycle (5.16)", -1.0 / (CASE.gammas[1] - 1.0), 0.0)
     axes = "real part of b G [-]", "imaginary part of b G [-]"

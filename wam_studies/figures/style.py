@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis.drawing import COLOURS, PREDICTED, SHAFTS, STYLE
@@ -24,21 +23,18 @@ FLAT = 1e-4  # of the value, the same
 
 
 @contextmanager
-def picture(file: Path, width: float, height: float, dpi: float = DPI) -> Iterator[Figure]:
+def picture(file: Path, width: float, height: float) -> Iterator[Figure]:
     """A figure of this size, inches, which is written to the file at the end."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
-        FigureCanvasAgg(figure)
         yield figure
-        figure.savefig(file, dpi=dpi)
+        figure.savefig(file, dpi=DPI)
 
 
 @contextmanager
-def panels(
-    file: Path, rows: int, columns: int, width: float, height: float, dpi: float = DPI
-) -> Iterator[tuple[Figure, list[Axes]]]:
+def panels(file: Path, rows: int, columns: int, width: float, height: float) -> Iterator[tuple[Figure, list[Axes]]]:
     """A figure of this size, inches, with its axes row by row."""
-    with picture(file, width, height, dpi) as figure:
+    with picture(file, width, height) as figure:
         yield figure, list(figure.subplots(rows, columns, squeeze=False).ravel())
 
 

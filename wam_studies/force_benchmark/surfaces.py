@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import Triple
@@ -115,7 +116,7 @@ def obstacles(body: RigidBody, q: Sequence[float], surfaces: Sequence[Surface]) 
             "obstacles.names": [name],
             "obstacles.shapes": ["plane" if surface.is_plane else "cylinder"],
             "obstacles.positions": position(body, q, surface).tolist(),
-            "obstacles.rotations": _angles(rotation(body, q, surface)),
+            "obstacles.rotations": pin.rpy.matrixToRpy(rotation(body, q, surface)).tolist(),
             "obstacles.sizes": [SHAPE.plane, SHAPE.plane, 0.0] if surface.is_plane else [*SHAPE.rod, 0.0],
             "obstacles.stiffness": [surface.stiffness],
             "obstacles.damping": [SHAPE.soft_damping * surface.stiffness if soft else SHAPE.damping],
@@ -129,9 +130,3 @@ def obstacles(body: RigidBody, q: Sequence[float], surfaces: Sequence[Surface]) 
         for key, value in values.items():
             found[f"driver:world.{key}"] = [*found.get(f"driver:world.{key}", []), *value]
     return found
-
-
-def _angles(turned: Array) -> list[float]:
-    """Roll, pitch and yaw about fixed axes, rad."""
-    pitch = math.asin(min(max(-turned[2, 0], -1.0), 1.0))
-    return [math.atan2(turned[2, 1], turned[2, 2]), pitch, math.atan2(turned[1, 0], turned[0, 0])]

@@ -18,7 +18,7 @@ from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, Triple
 from wam_studies.force_benchmark.surfaces import Surface, is_clear, obstacles
-from wam_studies.identification.plants import drawn_cover, factors, mismatch
+from wam_studies.identification.plants import drawn_cover, factors, log_uniform, mismatch
 
 Range = tuple[float, float]
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
@@ -182,7 +182,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     body = RigidBody(arm)
     unknowns, errors = (np.random.Generator(np.random.PCG64((seed, number, stream))) for stream in (2, 3))
     conditions = {**_conditions(arm, random), **_unknowns(unknowns), **_errors(arm, errors)}
-    force = _log_uniform(random, *RANGES.forces)
+    force = log_uniform(random, *RANGES.forces)
     elbow = ElbowJoint.of(body)
     q = _pose(arm, elbow, random)
     surface = _surface(body, q, random)
@@ -203,13 +203,13 @@ def _in_time(task: Task, random: np.random.Generator) -> Task:
     """
     share = random.random()
     if share < RANGES.stepped:
-        change = _log_uniform(random, *RANGES.changes)
+        change = log_uniform(random, *RANGES.changes)
         first = task.force * (change if random.random() < RANGES.down else 1.0 / change)
         most = min(RANGES.forces[1], RANGES.deepest * task.surface.stiffness)
         return task._replace(before=min(max(first, RANGES.forces[0]), most))
     if share < RANGES.stepped + RANGES.long:
-        surface = task.surface._replace(stiffness=_log_uniform(random, RANGES.stiffnesses[0], RANGES.soft))
-        small = _log_uniform(random, *RANGES.small_forces)
+        surface = task.surface._replace(stiffness=log_uniform(random, RANGES.stiffnesses[0], RANGES.soft))
+        small = log_uniform(random, *RANGES.small_forces)
         return task._replace(surface=surface, force=small, is_pinned=True, longer=RANGES.longer)
     return task
 
@@ -218,7 +218,7 @@ def _unknowns(random: np.random.Generator) -> dict[str, Any]:
     """Of some tasks a payload or a law of friction of which the controllers know nothing."""
     share = random.random()
     if share < RANGES.loaded:
-        return {"payload": _log_uniform(random, *RANGES.payloads)}
+        return {"payload": log_uniform(random, *RANGES.payloads)}
     if share < RANGES.loaded + RANGES.other_friction:
         return {"asymmetry": float(random.uniform(-RANGES.asymmetry, RANGES.asymmetry))}
     return {}
@@ -273,7 +273,7 @@ def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -
     place = length if is_plane else float(random.uniform(RANGES.places[0] * length, RANGES.places[1] * length))
     about = float(random.uniform(-math.pi, math.pi))
     local = np.array([math.sin(lean), math.cos(lean) * math.cos(about), math.cos(lean) * math.sin(about)])
-    stiffness = _log_uniform(random, *RANGES.stiffnesses)
+    stiffness = log_uniform(random, *RANGES.stiffnesses)
     direction = triple(body.cover_pose(q, cover).rotation @ local)
     return Surface(cover, place, direction, stiffness, float(random.uniform(*RANGES.frictions)), is_plane)
 
@@ -285,7 +285,7 @@ def _moving(surface: Surface, ramp: float, random: np.random.Generator) -> Surfa
     along, about = np.array(surface.direction), random.normal(size=3)
     if random.random() >= RANGES.along:
         along = np.cross(along, about) / np.linalg.norm(np.cross(along, about))
-    speed, frequency = _log_uniform(random, *RANGES.speeds), _log_uniform(random, *RANGES.frequencies)
+    speed, frequency = log_uniform(random, *RANGES.speeds), log_uniform(random, *RANGES.frequencies)
     amplitude = min(speed / (2.0 * math.pi * frequency), RANGES.farthest)
     begin = RANGES.release + ramp + RANGES.at_rest
     return surface._replace(motion=triple(amplitude * along), frequency=frequency, begin=begin)
@@ -297,12 +297,8 @@ def _doubled(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
         found = _surface(body, task.q, random)._replace(stiffness=task.surface.stiffness)
         is_apart = found.cover != task.surface.cover or abs(found.position - task.surface.position) > RANGES.apart
         if is_apart and is_clear(body, task.q, found):
-            return task._replace(second=(found, _log_uniform(random, *RANGES.forces)), is_pinned=True)
+            return task._replace(second=(found, log_uniform(random, *RANGES.forces)), is_pinned=True)
     return task
-
-
-def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
-    return math.exp(random.uniform(math.log(low), math.log(high)))
 
 
 def configured(base: Configuration, task: Task) -> Configuration:

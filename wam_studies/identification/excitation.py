@@ -71,7 +71,7 @@ def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[S
     random = np.random.Generator(np.random.PCG64(seed))
     space = _Space(configuration)
     sought = unknowns(shared)
-    information = np.diag(sought.prior_sd**-2)
+    information = sought.prior
     posture, spent = np.array(shared.arm.joints.start), 0.0
     while spent < seconds:
         drawn = (space.draw(random, posture) for _ in range(MOVES.trials))
@@ -171,5 +171,4 @@ def _information(shared: Shared, points: MovePoints) -> Array:
     equations = Regressor(shared, sought, motion).equations(sought.present)
     equations.columns[..., sought.places("motors.stribeck_velocity")] = 0.0  # no move is chosen for it
     rows = equations.columns[equations.is_used]
-    found: Array = rows.T @ rows / MOVES.torque_sd**2
-    return found
+    return rows.T @ rows / MOVES.torque_sd**2

@@ -12,6 +12,7 @@ from wam_analysis.identification.unknowns import shared_joints
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
+from wam_description.parameters import each
 from wam_description.rigid_body import Array
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
@@ -134,10 +135,14 @@ class DrawnArm(NamedTuple):
         return {"driver:amplifier.torque_ripple": each, "driver:amplifier.current_noise": each}
 
 
+def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    """A number between two ends, uniform in its logarithm."""
+    return math.exp(random.uniform(math.log(low), math.log(high)))
+
+
 def factors(random: np.random.Generator, width: float, names: Sequence[str]) -> list[float]:
     """Factors about 1 within a largest error, one for each name."""
-    found: list[float] = (1.0 + width * random.uniform(-1.0, 1.0, len(names))).tolist()
-    return found
+    return (1.0 + width * random.uniform(-1.0, 1.0, len(names))).tolist()
 
 
 def mismatch(random: np.random.Generator, arm: Arm, mass: float, friction: float, stiffness: float) -> Values:
@@ -178,8 +183,7 @@ class TrueFriction(NamedTuple):
         transmitted = np.abs(load + sign * self.at_joint[way])
         mean = (transmitted * moves).sum(0) / moves.sum(0)
         slow = np.exp(-((speed / self.stribeck_velocity) ** 2))
-        found: Array = self.coulomb[way] + self.drop[way] * slow + self.load[way] * mean + self.viscous * speed
-        return found
+        return self.coulomb[way] + self.drop[way] * slow + self.load[way] * mean + self.viscous * speed
 
 
 def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
@@ -254,4 +258,4 @@ def true_friction(configuration: Configuration) -> TrueFriction:
 
 
 def _each(values: tuple[float, ...], n: int) -> Array:
-    return np.array(values * n if len(values) == 1 else values)
+    return np.array(each(values, n))

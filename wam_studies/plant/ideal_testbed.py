@@ -101,14 +101,12 @@ def stepped_map(plant: Plant, steps: int = 1) -> tuple[Numbers, Numbers]:
 
 def amplitude(state: Numbers, inlet: Numbers, z: NDArray[np.complex128], row: int) -> Numbers:
     """Amplitude of an element of the state over that of the input, at each z of a sampled map."""
-    found: Numbers = np.abs([np.linalg.solve(one * np.eye(len(state)) - state, inlet)[row] for one in z])
-    return found
+    return np.abs([np.linalg.solve(one * np.eye(len(state)) - state, inlet)[row] for one in z])
 
 
 def frequencies(plant: Plant, step: float = STEP) -> Numbers:
     """Undamped frequencies of the plant, each twice, the lowest first, rad/s, from its map over a step."""
-    found: Numbers = np.sort(np.abs(np.angle(np.linalg.eigvals(stepped_map(plant)[0])))) / step
-    return found
+    return np.sort(np.abs(np.angle(np.linalg.eigvals(stepped_map(plant)[0])))) / step
 
 
 def power_ratio(plant: Plant, load: float, steps: int) -> float:
@@ -121,11 +119,12 @@ def power_ratio(plant: Plant, load: float, steps: int) -> float:
     return load * (plant.q[0] - q) / work
 
 
-def limiting_efficiency(arm: Arm, torque: float) -> float:
-    """Power out over power in, at most, (6.15), under a torque of the motor, N m."""
-    cables = arm.cables
-    losses = cable.stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio)
-    return cable.efficiency(losses)
+def limiting_efficiency(arm: Arm, torque: float, motor: int = 0) -> float:
+    """Power out over power in, at most, (6.15), under a torque of a motor, N m."""
+    cables, name = arm.cables, arm.motors.names[motor]
+    columns = cables.stage_motors, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio
+    stages = [stage for of, *stage in zip(*columns, strict=True) if of == name]
+    return cable.efficiency(cable.stage_loss(torque, *zip(*stages, strict=True)))
 
 
 class PlantResponse(NamedTuple):

@@ -191,13 +191,12 @@ def _hinge_torque(run: Recording, door: ObjectTrace) -> Numbers:
     length, thickness = doors.sizes[0], doors.sizes[1]
     inertia = doors.mass[0] * (4.0 * length**2 + thickness**2) / 3.0  # about the hinge
     rate = np.gradient(door.angle, door.time)
-    torque: Numbers = (
+    return (
         inertia * np.gradient(rate, door.time)
         + doors.hinge_damping[0] * rate
         + doors.spring[0] * (door.angle - doors.rest[0])
         + doors.hinge_friction[0] * np.sign(rate)
     )
-    return torque
 
 
 def _across(run: Recording, step: Step) -> float:
@@ -209,11 +208,10 @@ def _estimate(run: Recording, step: Step) -> list[Comparison]:
     """The estimate over a step next to the truth: the force across, and the time with the correct link."""
     truth, estimate = run.forces(TRUE).during(step.begin, step.end), run.forces(ESTIMATED)
     at = np.searchsorted(estimate.time, truth.time).clip(0, len(estimate.time) - 1)
-    frames = np.array(truth.frames)
-    touched = frames != "base"
+    touched = truth.frames != "base"
     if not np.any(touched):
         return [Comparison(f"{step.name}, contact", "yes", "no")]
-    right = np.array(estimate.frames)[at][touched] == frames[touched]
+    right = estimate.frames[at][touched] == truth.frames[touched]
     true, estimated = float(truth.across[touched].mean()), float(estimate.across[at][touched].mean())
     return [
         Comparison(f"{step.name}, estimated force across the link, mean", true, estimated, "N", NO_CLAIM, "true"),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.recording import AnalysedRecording
-from wam_bag.bag import BagError
+from wam_bag.bag import BagError, TableColumns
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Forces, Recording, Runs, Step
@@ -80,9 +80,10 @@ def _late(time: Numbers, step: Step, part: float = 1.0) -> NDArray[np.bool_]:
 
 def _outside(run: Recording, step: Step, label: str, position: float) -> Comparison:
     """How far the true position of a contact is outside the set that the estimator states: none where it is in it."""
-    time, columns = run.table("contact/hypotheses")
+    found = run.columns("contact/hypotheses", TableColumns)
+    columns = found.columns
     cover = run.shared.arm.covers.names.index("outer_link")
-    here = _late(time, step) & (columns["link"] == cover)
+    here = _late(found.row_stamp_ns / 1e9, step) & (columns["link"] == cover)
     low, high = columns["low"][here], columns["high"][here]
     beyond = np.maximum(np.maximum(low - position, position - high), 0.0)
     outside = float(np.median(np.nan_to_num(beyond, nan=np.inf))) if len(low) else math.inf
@@ -98,8 +99,7 @@ def along(run: Recording) -> Along:
     frame = command.frames[int(np.flatnonzero(pressed)[0])]
 
     def at_truth(forces: Forces, sign: float) -> Numbers:
-        in_frame = np.array([name == frame for name in forces.frames])
-        values = np.where(in_frame, sign * (forces.force @ axis), 0.0)
+        values = np.where(forces.frames == frame, sign * (forces.force @ axis), 0.0)
         return np.interp(truth.time, forces.time, values)
 
     return Along(truth.time, at_truth(command, 1.0), at_truth(truth, -1.0), at_truth(estimated, -1.0))

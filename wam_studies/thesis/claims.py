@@ -1,13 +1,13 @@
 """What the thesis claims and what shows it: items of docs/thesis.yaml, checked, and as tables."""
 
 import csv
-import importlib
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from io import StringIO
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
 import yaml
@@ -98,21 +98,16 @@ def unresolved(reference: str, root: Path) -> str:
         return "" if there[kind] else f"there is no {kind} '{name}'"
     if "/" in reference:
         return "" if (root / reference).is_file() else f"there is no file '{reference}'"
-    return "" if _importable(reference) else f"'{reference}' cannot be imported"
+    try:
+        resolve_name(reference)
+    except (ImportError, AttributeError, ValueError):
+        return f"'{reference}' cannot be imported"
+    return ""
 
 
 def _is_test(root: Path, file: str, test: str) -> bool:
     path = next(root.glob(f"test/*/{file}.py"), None) if file else None
     return path is not None and f"\ndef {test}(" in path.read_text(encoding="utf-8")
-
-
-def _importable(name: str) -> bool:
-    """Whether a dotted name is a module, or a name of one."""
-    module, _, attribute = name.rpartition(".")
-    try:
-        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(name))
-    except (ImportError, ValueError):
-        return False
 
 
 def count(chapters: Mapping[str, Sequence[Claim]]) -> str:

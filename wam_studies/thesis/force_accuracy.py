@@ -43,13 +43,12 @@ def _fed_forward(shown: TestbedStep) -> Numbers:
     """F_des from the torque of the motor, N, at the times of the sensors."""
     motors = shown.run.joints("motor_states")
     torque = -np.interp(shown.time, motors.time, motors.effort[:, 0])
-    desired: Numbers = torque * shown.link.ratio / shown.link.lever
-    return desired
+    return torque * shown.link.ratio / shown.link.lever
 
 
 def _calibration(name: str, shown: TestbedStep) -> Comparison:
     """Settled force of a loop that knows another stiffness of its spring: F_des k/k_known."""
-    known = shown.run.node("force_loop", ForceLoopParameters).spring_stiffness[0]
+    known = shown.run.parameters.part("force_loop", ForceLoopParameters).spring_stiffness[0]
     settled = shown.force[shown.time > shown.time[-1] - BOUNDS.settled_force]
     expected = shown.desired * shown.link.node.contact_stiffness / known
     return near(f"settled force, {name}", expected, settled.mean(), "N", "2.2")

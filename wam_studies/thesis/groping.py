@@ -59,8 +59,7 @@ def touched(run: Recording, step: Step) -> Numbers:
     i = arm.covers.names.index(cover)
     inwards = np.array([0.0, push[1], push[2]]) / np.hypot(push[1], push[2])
     axis = np.array(arm.covers.on_axis(cover, place))
-    point: Numbers = RigidBody(arm).point(q, cover, axis - arm.covers.radius[i] * inwards)
-    return point
+    return RigidBody(arm).point(q, cover, axis - arm.covers.radius[i] * inwards)
 
 
 def _last(times: Numbers, time: float) -> int:

@@ -56,7 +56,7 @@ class OneLink(NamedTuple):
 
 def joint_stiffness(recording: Recording) -> float:
     """k_c of the spring at the joint, N m/rad."""
-    springs = recording.part("driver", "world.springs", Springs)
+    springs = recording.parameters.part("driver", Springs, "world.springs.")
     return float(springs.stiffness[0] * springs.lever[0] ** 2)
 
 
@@ -68,7 +68,7 @@ def one_link(recording: Recording) -> OneLink:
     ValueError
         if the arm has more than one joint, or the loop has a G_P.
     """
-    arm, control = recording.shared.arm, recording.node("force_loop", ForceLoopParameters)
+    arm, control = recording.shared.arm, recording.parameters.part("force_loop", ForceLoopParameters)
     if len(arm.joints.names) != 1:
         raise ValueError(f"{arm.name} has {len(arm.joints.names)} joints; this evaluation is for one")
     law = force_law(control)
@@ -77,7 +77,7 @@ def one_link(recording: Recording) -> OneLink:
             f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P"
         )
     ratio, lever = 1.0 / arm.joint_from_motor[0], control.contact_position
-    (added,) = recording.node("driver", DriverParameters).effects.added_coulomb_friction
+    (added,) = recording.parameters.part("driver", DriverParameters).effects.added_coulomb_friction
     node = loop_node(arm, joint_stiffness(recording))
     friction = {f"{kind}_friction": getattr(node, f"{kind}_friction") + added for kind in ("dynamic", "static")}
     loop = IntegralLoop(

@@ -36,13 +36,12 @@ def _hunting(shown: TestbedStep, level: float) -> list[Comparison]:
     late = shown.time > shown.time[-1] - BOUNDS.frictionless_end
     force = shown.force[late]
     swing = last_cycle(shown.time[late], force)
-    natural = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     expected = hunting(level, shown.link.gamma, desired)
     return [
         near("no friction, F_c", threshold(desired, level), force.mean(), "N", "between two steps"),
         below("no friction, error of F_c", float(force.mean()) - desired, "N", 0.5 * level),
         near("no friction, peak to peak", expected, swing.peak_to_peak, "N", "relay, (5.15)", neglected),
-        near("no friction, period", 2.0 * math.pi / natural, swing.period, "s", "relay", neglected),
+        near("no friction, period", 2.0 * math.pi / node.natural_frequency, swing.period, "s", "relay", neglected),
     ]
 
 
@@ -71,5 +70,5 @@ def _resting(shown: TestbedStep, level: float) -> list[Comparison]:
 
 def _level(shown: TestbedStep) -> float:
     """A step of the measured force at the tip, N."""
-    (resolution,) = shown.run.node("driver", DriverParameters).sensors.joint_encoder_resolution
+    (resolution,) = shown.run.parameters.part("driver", DriverParameters).sensors.joint_encoder_resolution
     return resolution * shown.link.node.contact_stiffness / shown.link.lever

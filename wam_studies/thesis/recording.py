@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from wam_bag.arrays import Numbers
+from wam_bag.arrays import Numbers, Texts
 from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_bag.losses import CUT
 from wam_description.arm import Shared
@@ -34,19 +34,17 @@ class Forces(NamedTuple):
     time: Numbers
     force: Numbers
     torque: Numbers
-    frames: tuple[str, ...]
+    frames: Texts
 
     def during(self, begin: float, end: float) -> "Forces":
         """The part between two times, s."""
         there = (self.time >= begin) & (self.time < end)
-        frames = tuple(np.array(self.frames, dtype=str)[there].tolist())
-        return Forces(self.time[there], self.force[there], self.torque[there], frames)
+        return Forces._make(values[there] for values in self)
 
     @property
     def across(self) -> Numbers:
         """Size of the force across the link's axis, (k,) N."""
-        found: Numbers = np.hypot(self.force[:, 1], self.force[:, 2])
-        return found
+        return np.hypot(self.force[:, 1], self.force[:, 2])
 
 
 class Step(NamedTuple):
@@ -114,14 +112,6 @@ class Recording(NamedTuple):
         """Parameters that every node read."""
         return self.parameters.shared
 
-    def node(self, name: str, cls: type[T]) -> T:
-        """The parameters of one node, at the start."""
-        return self.parameters.part(name, cls)
-
-    def part(self, name: str, prefix: str, cls: type[T]) -> T:
-        """A part of a node's parameters, as ``part('driver', 'world.springs', Springs)``, whatever else it has."""
-        return self.parameters.part(name, cls, f"{prefix}.")
-
     def joints(self, topic: str) -> RecordedJoints:
         """Recorded columns of a JointState topic."""
         columns = self.columns(topic, JointColumns)
@@ -130,17 +120,12 @@ class Recording(NamedTuple):
     def forces(self, topic: str) -> Forces:
         """Recorded forces of a WrenchStamped topic."""
         columns = self.columns(topic, WrenchColumns)
-        return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, tuple(columns.frames))
-
-    def table(self, topic: str) -> tuple[Numbers, Mapping[str, Numbers]]:
-        """Times (p,) s and columns (p,) of the rows of a table."""
-        found = self.columns(topic, TableColumns)
-        return found.stamp_ns[found.message] / 1e9, found.columns
+        return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, np.array(columns.frames, object))
 
     @property
     def world(self) -> World:
         """The world that the run was made in."""
-        return self.part("driver", "world", World)
+        return self.parameters.part("driver", World, "world.")
 
     @property
     def objects(self) -> dict[str, ObjectTrace]:

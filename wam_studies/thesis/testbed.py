@@ -100,8 +100,8 @@ def own_servo(runs: Runs) -> Result:
 
 def margin_with_servo(run: Recording) -> float:
     """Marginal G_I at the tip, m/s/N, of the sampled loop with the velocity loop and the damping of the cable."""
-    parameters = run.node("force_loop", ForceLoopParameters)
-    servo = run.part("velocity_loop", "servo", Servo)
+    parameters = run.parameters.part("force_loop", ForceLoopParameters)
+    servo = run.parameters.part("velocity_loop", Servo, "servo.")
     guard = replace(parameters.guard, extra_delay=0)
     found = StabilityGuard(run.shared.arm, servo, run.shared.timing, guard, parameters.sensing)
     touches = found.contacts(guard.posture, parameters.contact_cover, parameters.contact_position, 0.0)

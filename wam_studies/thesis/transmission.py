@@ -68,8 +68,7 @@ def response_of(run: Recording, frequency: Numbers) -> Complex:
     cable = circuit.stiffness + circuit.damping * s
     motor = arm.motors.inertia[0] * s**2 + arm.motors.viscous_friction[0] * s + cable
     link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + joint_stiffness(run)
-    found: Complex = ratio * cable / (motor * link - (ratio * cable) ** 2)
-    return found
+    return ratio * cable / (motor * link - (ratio * cable) ** 2)
 
 
 def transfer(run: Recording) -> Transfer:
@@ -95,8 +94,7 @@ def spectra(frequency: Numbers, u: Complex, y: Complex) -> Transfer:
     window = np.ones(BOUNDS.averaged_frequencies) / BOUNDS.averaged_frequencies
 
     def mean(values: Complex) -> Complex:
-        found: Complex = np.convolve(values, window, mode="same")
-        return found
+        return np.convolve(values, window, mode="same")
 
     both, inputs, outputs = mean(u * y.conj()), mean(np.abs(u) ** 2 + 0j).real, mean(np.abs(y) ** 2 + 0j).real
     return Transfer(frequency, both / outputs, np.abs(both) ** 2 / (inputs * outputs))
