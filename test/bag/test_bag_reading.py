@@ -207,16 +207,12 @@ def test_point_clouds_of_any_number_of_points_are_one_table(tmp_path: Path) -> N
     assert columns.columns["ab"].shape == ((3 + 8 + 1) * 30, 3)
 
 
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({"row_step": 81}, "row_step 81 does"),
-        ({"point_step": 0}, "point_step 0"),
-        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 9, 1)]}, "x \\[0, 9, 1\\]"),
-        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 8, 1)] * 2}, "name already used"),
-        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("y", 0, 8, 1)]}, "have the fields x, n, ab and y"),
-    ],
-)
+@pytest.mark.parametrize(("changed", "words"), [
+    ({"row_step": 81}, "row_step 81 does"), ({"point_step": 0}, "point_step 0"),
+    ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 9, 1)]}, "x \\[0, 9, 1\\]"),
+    ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 8, 1)] * 2}, "name already used"),
+    ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("y", 0, 8, 1)]}, "have the fields x, n, ab and y"),
+])  # fmt: skip
 def test_point_clouds_whose_sizes_do_not_fit_are_refused(tmp_path: Path, changed: dict[str, Any], words: str) -> None:
     path = write(tmp_path / "bag.mcap", [cloud(1, 3), cloud(2, 3, **changed)])
     with pytest.raises(BagError, match=rf"bag\.mcap.*/cloud.*{words}"):
@@ -406,16 +402,11 @@ def doubling(depth: int, last: str) -> str:
     return "B0 x\n" + "".join(parts) + f"{'=' * 80}\nMSG: a/B{depth}\n{last}\n"
 
 
-@pytest.mark.parametrize(
-    ("schema", "reason"),
-    [
-        (doubling(40, "uint8 z"), "a message ends early"),
-        (doubling(40, ""), "a message ends early"),
-        ("float64[1000000000000] x", "a message ends early"),
-        ("uint8 a\nuint8 a", "has a field twice"),
-        (f"uint8[{'9' * 5000}] x", "with a schema that cannot be read"),
-    ],
-)
+@pytest.mark.parametrize(("schema", "reason"), [
+    (doubling(40, "uint8 z"), "a message ends early"), (doubling(40, ""), "a message ends early"),
+    ("float64[1000000000000] x", "a message ends early"), ("uint8 a\nuint8 a", "has a field twice"),
+    (f"uint8[{'9' * 5000}] x", "with a schema that cannot be read"),
+])  # fmt: skip
 def test_a_hostile_schema_is_refused_in_no_time(schema: str, reason: str, tmp_path: Path) -> None:
     path = hostile(tmp_path / "bag.mcap", schema, b"\xff" * 4 + bytes(100))
     with limits(MEMORY // 16), pytest.raises(BagError, match=reason):
@@ -480,15 +471,11 @@ def _huge_count(data: bytearray) -> None:
     struct.pack_into("<I", data, 12, 2**32 - 1)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda data: data.__delitem__(slice(40, None)), "a message ends early"),
-        (_huge_count, "a message ends early"),
-        (lambda data: data.__setitem__(1, 7), "encapsulation 0007; plain CDR is read"),
-        (lambda data: data.clear(), "encapsulation none"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda data: data.__delitem__(slice(40, None)), "a message ends early"), (_huge_count, "a message ends early"),
+    (lambda data: data.__setitem__(1, 7), "encapsulation 0007; plain CDR is read"),
+    (lambda data: data.clear(), "encapsulation none"),
+])  # fmt: skip
 @pytest.mark.parametrize("topic", ["/js", "/js_decoded"])
 def test_a_message_that_is_none_is_named(
     tmp_path: Path, change: Callable[[bytearray], None], words: str, topic: str

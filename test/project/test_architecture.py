@@ -233,36 +233,26 @@ def test_arrows_point_downwards():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("path", "source"),
-    [
-        ("wam_theory/friction.py", "import scipy"),
-        ("wam_description/arm.py", "import wam_driver.plant"),
-        ("wam_description/synchroniser.py", "from wam_ros import run"),
-        ("wam_bag/writer.py", "from wam_description.topics import TOPICS"),
-        ("wam_driver/plant.py", "from wam_control.gravity import Gravity"),
-        ("wam_driver/plant.py", "def f():\n    import rclpy"),
-        ("wam_driver/plant.py", "from sensor_msgs.msg import JointState"),
-        ("wam_driver/plant.py", "from . import driver_node"),
-        ("wam_driver/plant.py", "from .. import wam_control"),
-        ("wam_driver/driver_node.py", "from wam_control import gravity"),
-        ("wam_control/velocity/gravity_node.py", "import wam_driver"),
-        ("wam_control/gravity.py", "import importlib\nimportlib.import_module('wam_driver.plant')"),
-        ("wam_control/gravity.py", "from time import monotonic"),
-        ("wam_control/gravity.py", "import numpy as np\nnoise = np.random.default_rng()"),
-        ("wam_control/gravity.py", "print('here')"),
-        ("wam_control/gravity.py", "class Arm:\n    pass"),
-        ("wam_ros/messages.py", "from wam_control.gravity import Gravity"),
-        ("wam_sim/simulation.py", "from wam_ros.messages import read"),
-        ("wam_analysis/report.py", "import rclpy"),
-        ("wam_analysis/report.py", "from wam_studies import press"),
-        ("wam_studies/press.py", "print('pressed')"),
-        ("wam_cli/commands/up.py", "from wam_driver.driver_node import DriverNode"),
-        ("wam_driver/motor_utils.py", ""),
-        ("wam_control/unnamed.py", ""),
-        ("wam_studies/losses.py", "from wam_cli import main"),
-    ],
-)
+@pytest.mark.parametrize(("path", "source"), [
+    ("wam_theory/friction.py", "import scipy"), ("wam_description/arm.py", "import wam_driver.plant"),
+    ("wam_description/synchroniser.py", "from wam_ros import run"),
+    ("wam_bag/writer.py", "from wam_description.topics import TOPICS"),
+    ("wam_driver/plant.py", "from wam_control.gravity import Gravity"),
+    ("wam_driver/plant.py", "def f():\n    import rclpy"),
+    ("wam_driver/plant.py", "from sensor_msgs.msg import JointState"),
+    ("wam_driver/plant.py", "from . import driver_node"), ("wam_driver/plant.py", "from .. import wam_control"),
+    ("wam_driver/driver_node.py", "from wam_control import gravity"),
+    ("wam_control/velocity/gravity_node.py", "import wam_driver"),
+    ("wam_control/gravity.py", "import importlib\nimportlib.import_module('wam_driver.plant')"),
+    ("wam_control/gravity.py", "from time import monotonic"),
+    ("wam_control/gravity.py", "import numpy as np\nnoise = np.random.default_rng()"),
+    ("wam_control/gravity.py", "print('here')"), ("wam_control/gravity.py", "class Arm:\n    pass"),
+    ("wam_ros/messages.py", "from wam_control.gravity import Gravity"),
+    ("wam_sim/simulation.py", "from wam_ros.messages import read"), ("wam_analysis/report.py", "import rclpy"),
+    ("wam_analysis/report.py", "from wam_studies import press"), ("wam_studies/press.py", "print('pressed')"),
+    ("wam_cli/commands/up.py", "from wam_driver.driver_node import DriverNode"), ("wam_driver/motor_utils.py", ""),
+    ("wam_control/unnamed.py", ""), ("wam_studies/losses.py", "from wam_cli import main"),
+])  # fmt: skip
 def test_a_planted_fault_is_found(tmp_path, path, source):
     plant_a_sound_tree(tmp_path)
     assert complaints(tmp_path) == []

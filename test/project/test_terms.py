@@ -127,20 +127,10 @@ def test_texts_are_in_the_terms_of_the_field() -> None:
     assert not found, f"{len(found)} terms:\n" + "\n".join(found)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "The push is felt.",
-        "The message says why",
-        "the estimated place",
-        "pin the place",
-        "delayed, or 2 periods late",
-        "held for ever",
-        "Departures of the arm",
-        "one YAML a configuration",
-        "a dead zone of 2 N",
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "The push is felt.", "The message says why", "the estimated place", "pin the place", "delayed, or 2 periods late",
+    "held for ever", "Departures of the arm", "one YAML a configuration", "a dead zone of 2 N",
+])  # fmt: skip
 def test_a_wrong_term_is_found_where_a_user_reads_it(text: str) -> None:
     assert list(found_in(texts_of_a_page(text), "page"))
     assert list(found_in(texts_of_a_module(f'def f():\n    """{text}"""'), "docstring"))
@@ -148,14 +138,9 @@ def test_a_wrong_term_is_found_where_a_user_reads_it(text: str) -> None:
     assert list(found_in(texts_of_comments(f"x = 1  # {text}"), "comment"))
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "The deadband is 2 N; besides, it is known.",
-        "It takes the place of that, in one place.",
-        "`felt`",
-        "```\nfelt\n```",
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "The deadband is 2 N; besides, it is known.", "It takes the place of that, in one place.", "`felt`",
+    "```\nfelt\n```",
+])  # fmt: skip
 def test_right_terms_and_code_are_not(text: str) -> None:
     assert not list(found_in(texts_of_a_page(text), "page"))

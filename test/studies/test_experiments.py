@@ -66,16 +66,12 @@ def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
         load("creeep")
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"rums": []}, "unknown key 'rums'"),
-        ({"runs": []}, "'runs' must be a list with at least one"),
-        ({"runs": [{"name": "../x", "steps": [{}]}]}, "it must be valid for a directory"),
-        ({"runs": [{"name": "a", "steps": [{}]}] * 2}, "several runs are named a"),
-        ({"runs": [{"name": "a"}]}, "'steps' is missing"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"rums": []}, "unknown key 'rums'"), ({"runs": []}, "'runs' must be a list with at least one"),
+    ({"runs": [{"name": "../x", "steps": [{}]}]}, "it must be valid for a directory"),
+    ({"runs": [{"name": "a", "steps": [{}]}] * 2}, "several runs are named a"),
+    ({"runs": [{"name": "a"}]}, "'steps' is missing"),
+])  # fmt: skip
 def test_a_file_that_is_not_an_experiment_is_refused(change: dict, message: str, tmp_path: Path) -> None:
     body = {"title": "t", "section": "1", "configuration": "testbed", "evaluation": "cables.creeping"}
     file = tmp_path / "mine.yaml"

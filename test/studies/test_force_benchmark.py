@@ -137,23 +137,17 @@ def held(newtons: float, **more: Any) -> TaskTrace:
     return trace([0.0] * 100 + [newtons] * 3000, **more)
 
 
-@pytest.mark.parametrize(
-    ("seen", "expected"),
-    [
-        (held(10.9), TaskEnd.DONE),
-        (held(9.1, event=REPORTED), TaskEnd.DONE),
-        (held(10.9, event=REPORTED, is_stopped=True), TaskEnd.ENDED),
-        (held(11.1), TaskEnd.SILENT),
-        (held(0.0), TaskEnd.SILENT),
-        (held(11.1, event=REPORTED), TaskEnd.ENDED),
-        (held(0.0, event=REPORTED, is_stopped=True, travel=0.0), TaskEnd.REFUSED),
-        (held(0.0, event=REPORTED, is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
-        (held(2.0, event=REPORTED, is_stopped=True), TaskEnd.GIVEN_UP),
-        (trace([0.0, 10.1] + [2.0] * 3000, event=REPORTED, is_stopped=True), TaskEnd.ENDED),
-        (held(2.0, event=fault("hit"), is_stopped=True), TaskEnd.ENDED),
-        (held(0.0, event=REPORTED, travel=0.0), TaskEnd.ENDED),
-    ],
-)
+@pytest.mark.parametrize(("seen", "expected"), [
+    (held(10.9), TaskEnd.DONE), (held(9.1, event=REPORTED), TaskEnd.DONE),
+    (held(10.9, event=REPORTED, is_stopped=True), TaskEnd.ENDED), (held(11.1), TaskEnd.SILENT),
+    (held(0.0), TaskEnd.SILENT), (held(11.1, event=REPORTED), TaskEnd.ENDED),
+    (held(0.0, event=REPORTED, is_stopped=True, travel=0.0), TaskEnd.REFUSED),
+    (held(0.0, event=REPORTED, is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
+    (held(2.0, event=REPORTED, is_stopped=True), TaskEnd.GIVEN_UP),
+    (trace([0.0, 10.1] + [2.0] * 3000, event=REPORTED, is_stopped=True), TaskEnd.ENDED),
+    (held(2.0, event=fault("hit"), is_stopped=True), TaskEnd.ENDED),
+    (held(0.0, event=REPORTED, travel=0.0), TaskEnd.ENDED),
+])  # fmt: skip
 def test_an_outcome_is_that_of_the_true_force_and_the_report(seen: TaskTrace, expected: TaskEnd) -> None:
     assert evaluated(TASK, seen).outcome is expected
 

@@ -140,24 +140,15 @@ def test_every_study_names_a_page_that_has_its_section(name: str) -> None:
 TO_TWO, TO_ONE = (0.0, 2.0), (0.0, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("required", "target", "found", "mark"),
-    [
-        (TO_TWO, TO_ONE, Interval(0.9, 0.8, 1.4, 50), TARGET_MET),
-        (TO_TWO, TO_ONE, Interval(1.5, 1.2, 1.9, 50), MET),
-        (TO_TWO, TO_ONE, Interval(1.5, 1.2, 2.1, 50), MARGINAL),
-        (TO_TWO, TO_ONE, Interval(2.5, 2.2, 3.1, 50), MISSED),
-        (TO_TWO, TO_ONE, Interval(2.5, 1.2, 3.1, 50), MISSED_MARGINAL),
-        (TO_TWO, TO_ONE, quantile([0.5], 0.5), FEW),
-        (TO_TWO, TO_ONE, Interval(math.nan, math.nan, math.nan, 0), "no data"),
-        (ANY, TO_ONE, Interval(1.5, 1.2, 1.9, 50), TARGET_MISSED),
-        (ANY, ANY, share(1, 2), ""),
-        (NONE_AT_ALL, NONE_AT_ALL, events(0, 60.0), FEW),
-        (NONE_AT_ALL, NONE_AT_ALL, events(0, 130.0), MET),
-        (NONE_AT_ALL, NONE_AT_ALL, events(0, 700.0), TARGET_MET),
-        (NONE_AT_ALL, NONE_AT_ALL, events(1, 700.0), MISSED),
-    ],
-)
+@pytest.mark.parametrize(("required", "target", "found", "mark"), [
+    (TO_TWO, TO_ONE, Interval(0.9, 0.8, 1.4, 50), TARGET_MET), (TO_TWO, TO_ONE, Interval(1.5, 1.2, 1.9, 50), MET),
+    (TO_TWO, TO_ONE, Interval(1.5, 1.2, 2.1, 50), MARGINAL), (TO_TWO, TO_ONE, Interval(2.5, 2.2, 3.1, 50), MISSED),
+    (TO_TWO, TO_ONE, Interval(2.5, 1.2, 3.1, 50), MISSED_MARGINAL), (TO_TWO, TO_ONE, quantile([0.5], 0.5), FEW),
+    (TO_TWO, TO_ONE, Interval(math.nan, math.nan, math.nan, 0), "no data"),
+    (ANY, TO_ONE, Interval(1.5, 1.2, 1.9, 50), TARGET_MISSED), (ANY, ANY, share(1, 2), ""),
+    (NONE_AT_ALL, NONE_AT_ALL, events(0, 60.0), FEW), (NONE_AT_ALL, NONE_AT_ALL, events(0, 130.0), MET),
+    (NONE_AT_ALL, NONE_AT_ALL, events(0, 700.0), TARGET_MET), (NONE_AT_ALL, NONE_AT_ALL, events(1, 700.0), MISSED),
+])  # fmt: skip
 def test_a_mark_compares_value_and_interval_with_what_is_allowed(
     required: Bound, target: Bound, found: Interval, mark: str
 ) -> None:

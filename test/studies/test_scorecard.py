@@ -149,18 +149,13 @@ def test_coupled_bandwidth_is_the_least_of_an_arm_with_free_rotors(configuration
     assert arm.coupled_bandwidth > 3.0 * row(scorecard(arm), "open-loop force bandwidth, joint 2 (4.4)").value
 
 
-@pytest.mark.parametrize(
-    ("change", "measure"),
-    [
-        ({"steady_force": 40.0}, "steady force at any point"),
-        ({"friction_share": (0.014, 0.02, 0.01, 0.01)}, "peak torque / friction, joint 2"),
-        ({"cable_tension": 1.1}, "greatest cable tension"),
-        ({"pretension": 0.9}, "pretension"),
-        ({"aspect_ratio": (5.0, 8.0)}, "length / width, outer link"),
-        ({"efficiency": 0.9}, "limiting efficiency"),
-        ({"rotor_inertia": (0.01, 0.01, 9.0, 0.01)}, "rotors' inertia / link's inertia, joint 3"),
-    ],
-)
+@pytest.mark.parametrize(("change", "measure"), [
+    ({"steady_force": 40.0}, "steady force at any point"),
+    ({"friction_share": (0.014, 0.02, 0.01, 0.01)}, "peak torque / friction, joint 2"),
+    ({"cable_tension": 1.1}, "greatest cable tension"), ({"pretension": 0.9}, "pretension"),
+    ({"aspect_ratio": (5.0, 8.0)}, "length / width, outer link"), ({"efficiency": 0.9}, "limiting efficiency"),
+    ({"rotor_inertia": (0.01, 0.01, 9.0, 0.01)}, "rotors' inertia / link's inertia, joint 3"),
+])  # fmt: skip
 def test_a_worse_number_fails_its_own_row_alone(arm: Measures, change: dict[str, object], measure: str) -> None:
     rows = scorecard(replace(arm, **change))  # type: ignore[arg-type]
     assert [r.measure for r in rows if r.met is False] == [row(rows, measure).measure]

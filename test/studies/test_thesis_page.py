@@ -27,20 +27,10 @@ def test_every_section_that_claims_something_has_a_row() -> None:
     assert set(SECTIONS.split()) <= named
 
 
-@pytest.mark.parametrize(
-    "reference",
-    [
-        "experiment nothing",
-        "task nothing",
-        "figure 9.9",
-        "effect nothing",
-        "test test_scorecard.test_nothing",
-        "test test_nothing.test_nothing",
-        "docs/nothing.md",
-        "wam_theory.stiction.nothing",
-        "wam_theory.nothing",
-    ],
-)
+@pytest.mark.parametrize("reference", [
+    "experiment nothing", "task nothing", "figure 9.9", "effect nothing", "test test_scorecard.test_nothing",
+    "test test_nothing.test_nothing", "docs/nothing.md", "wam_theory.stiction.nothing", "wam_theory.nothing",
+])  # fmt: skip
 def test_a_reference_that_leads_nowhere_is_named(reference: str) -> None:
     assert reference.split()[-1] in unresolved(reference, ROOT)
 
