@@ -62,7 +62,7 @@ def section_of(file: Path, name: str) -> str:
 def kept_rows(text: str) -> dict[str, list[str]]:
     """Cells of each row of the tables in a section, by the first one, without the heads."""
     lines = [line for line in text.splitlines() if line[:2] == "| "]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    rows = [[cell.strip().replace("\\|", "|") for cell in f"{line} "[1:].split(" | ")[:-1]] for line in lines]
     parts = zip(rows, [*rows, [""]][1:], strict=True)
     return {row[0]: row for row, after in parts if not (row[0].startswith("---") or after[0].startswith("---"))}
 

@@ -746,7 +746,7 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
     ("time,q\n0,1\n", topic_map([], [], [], ["effort=q", "position=p"], []), "no column 'p'; .* position=.*: time"),
     ("time,f\n0,1\n", topic_map([], [], [], ["force=f"], []), "no column 'f.x'; name that of force .*: time, f"),
-    ("0,1\n1,1\n", NOTHING, "numbers in its first row"),
+    ("0,1\n1,1\n", NOTHING, "numbers in its first row"), ("t,q\n" + 10**6 * "1", NOTHING, "is no table: field larger"),
 ])  # fmt: skip
 def test_a_table_that_cannot_be_read_as_it_is_meant_is_refused(
     text: str, given: Any, message: str, tmp_path: Path

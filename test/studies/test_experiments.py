@@ -22,7 +22,7 @@ from wam_studies.thesis.evaluation import function_of
 from wam_studies.thesis.measurement import ExperimentCase, measure
 from wam_studies.thesis.one_link import one_link, played
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, noted, summary
 
 LEVER = 0.9144  # m
 STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad
@@ -84,6 +84,7 @@ def test_a_file_that_is_not_an_experiment_is_refused(change: dict, message: str,
 
 
 def test_a_row_agrees_within_its_bound_and_never_with_what_could_not_be_measured() -> None:
+    assert summary([noted("x", 2.0, "m")])[0] == "0 of 0"
     assert Comparison("x", 2.0, 2.03, bound=0.02).agrees
     assert not Comparison("x", 2.0, 2.05, bound=0.02).agrees
     assert Comparison("x", -2.0, -1.97, bound=0.02).deviation == pytest.approx(0.015)

@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple
 import pytest
 from arms import CONFIGURATION
 
+from wam_analysis.table import markdown
 from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import parameter
@@ -120,6 +121,7 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
     file.write_text(with_section(file, "square", "nothing"))
     assert section_of(file, "square") == "nothing\n"
     assert kept_rows("nothing") == {}
+    assert kept_rows(markdown(("row", "b"), [("|F|", "1 | 2")])) == {"|F|": ["|F|", "1 | 2"]}
     assert kept_rows(text)["largest"][:4] == ["largest", "m", "≤5", ""]
     assert file.read_text().endswith("## Method\n\nBy hand.\n")
     with pytest.raises(ValueError, match="has no line '<!-- written: other -->'"):

@@ -52,8 +52,10 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     if len(lines) < 2:
         raise BagError(f"{path} has no row below the names of its columns")
     delimiter = max(DELIMITERS, key=lines[0].replace(" ", "").count)
-    # line by line, so that a quote that is not closed ends with its row
-    head, *rows = (next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)) for line in lines)
+    try:  # line by line, so that a quote that is not closed ends with its row
+        head, *rows = [next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)) for line in lines]
+    except csv.Error as error:
+        raise BagError(f"{path} is no table: {error}") from error
     if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
         raise BagError(
             f"{path} has a row of {len(wide)} cells below {len(head)} titles, its first line; remove the lines "

@@ -148,7 +148,8 @@ def summary(rows: Sequence[Comparison]) -> tuple[str, ...]:
     claimed = [row for row in rows if row.is_claimed]
     agreeing = sum(row.agrees for row in claimed)
     verdict = f"{agreeing} of {len(claimed)}" + (" MISSED" if agreeing < len(claimed) else "")
-    return verdict, *_page_cells(max(claimed, key=lambda row: row.nearness))
+    nearest = max(claimed, key=lambda row: row.nearness, default=None)
+    return verdict, *(_page_cells(nearest) if nearest else (NOTHING,) * len(PAGE_HEAD))
 
 
 def value_text(value: float | str) -> str:
