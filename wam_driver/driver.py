@@ -144,6 +144,11 @@ class Driver:
         self._discard()
         self._watch.begin(self.plant.theta)
 
+    @property
+    def obstacle(self) -> str:
+        """Why the arm may not be enabled where it is, '' where it may."""
+        return self._watch.obstacle(self.plant.theta)
+
     def _discard(self) -> None:
         """Discard every command; all currents are zero until a new one arrives."""
         self._command = self._zero

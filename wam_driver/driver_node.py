@@ -81,7 +81,7 @@ class DriverNode(ArmDriver):
 
     def obstacle(self) -> str:
         """What speaks against a release of the brakes in the time of the arm."""
-        return self.time.obstacle()
+        return self.driver.obstacle or self.time.obstacle()
 
     @property
     def warnings(self) -> tuple[str, ...]:

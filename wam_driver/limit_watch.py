@@ -71,19 +71,34 @@ class LimitWatch:
             *((f"current of {name}", "A") for name in motors.names),
             *self._of_cables,
         ]
-        self._limits = self._with_travel(self._half)
-
-    def _with_travel(self, travel: Sequence[float]) -> list[float]:
-        """The limits of all quantities, with those of the travel, (n,), rad."""
-        return [*self._speeds, *travel, *self._arm.motors.peak_current, *self._strengths]
+        self._allowed = [self._half, self._half]  # how far below and above the middle each joint may be, rad
 
     def begin(self, theta: Sequence[float]) -> None:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""
-        q = self._map.joint_positions(theta)
-        there = [abs(angle - middle) for angle, middle in zip(q, self._middle, strict=True)]
-        self._limits = self._with_travel(
-            [half if at <= half else at + DRIVER.leeway for at, half in zip(there, self._half, strict=True)]
-        )
+        self._allowed = [
+            [most if most > half + DRIVER.leeway else half for most, half in zip(side, self._half, strict=True)]
+            for side in self._leeways(self._map.joint_positions(theta))
+        ]
+
+    def _leeways(self, q: Sequence[float]) -> list[list[float]]:
+        """How far below and above the middle is a leeway beyond each joint, and not before its stop."""
+        off = [angle - middle for angle, middle in zip(q, self._middle, strict=True)]
+        return [
+            [max(half, side * at + DRIVER.leeway) for at, half in zip(off, self._half, strict=True)]
+            for side in (-1.0, 1.0)
+        ]
+
+    def obstacle(self, theta: Sequence[float]) -> str:
+        """Why an arm at the motor angles theta, (n,), rad, may not be enabled: no joint is so far beyond a stop."""
+        for name, angle, middle, half in zip(
+            self._arm.joints.names, self._map.joint_positions(theta), self._middle, self._half, strict=True
+        ):
+            if not abs(angle - middle) <= 3.0 * half:
+                return (
+                    f"{name} is at {angle:.4g} rad, further beyond its stops, {middle - half:.4g} and "
+                    f"{middle + half:.4g} rad, than they are apart; correct the zero of the arm"
+                )
+        return ""
 
     def watched(
         self, theta: Sequence[float], thetad: Sequence[float], currents: Sequence[float], tensions: Sequence[float]
@@ -97,6 +112,11 @@ class LimitWatch:
         tensions : largest of each cable since the last check, N, (n,).
         """
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
+        # what was allowed beyond a stop is taken back as the joint returns
+        self._allowed = [list(map(min, *both)) for both in zip(self._allowed, self._leeways(q), strict=True)]
+        sides = zip(*self._allowed, q, self._middle, strict=True)
+        travel = [above if angle > middle else below for below, above, angle, middle in sides]
+        limits = [*self._speeds, *travel, *self._arm.motors.peak_current, *self._strengths]
         values = [
             *self._body.start_and_tool_speeds(q, qd),
             *map(abs, qd),
@@ -104,7 +124,7 @@ class LimitWatch:
             *map(abs, currents),
             *tensions,
         ]
-        return [self._located(near, q) for near in _near(self._quantities, values, self._limits)]
+        return [self._located(near, q) for near in _near(self._quantities, values, limits)]
 
     def _located(self, near: WatchedLimit, q: Sequence[float]) -> WatchedLimit:
         """A quantity; if it is a travel, with the angle of the joint and of its stop there."""

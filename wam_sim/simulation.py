@@ -233,7 +233,7 @@ class Simulation:
             return ""
         if request.service == "enable":
             safety = self.driver.safety
-            answer = safety.enable("") if request.data else safety.disable()
+            answer = safety.enable(self.driver.obstacle) if request.data else safety.disable()
             for synchroniser in set().union(*self._synchronisers.values()):
                 synchroniser.discard_commands(self.driver.stamp + self._timing.period_ns)
         else:

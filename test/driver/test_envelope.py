@@ -211,6 +211,16 @@ def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> 
     assert not excess([watched(watch, at)[name]], "limit")
     at[1] += 0.06
     assert excess([watched(watch, at)[name]], "limit")
+    for angle in (ARM.joints.lower[1] - 0.02, ARM.joints.upper[1] + 0.02):  # the other stop, and the passed one again
+        at[1] = angle
+        assert excess([watched(watch, at)[name]], "limit")
+
+
+def test_a_position_that_no_joint_has_is_an_obstacle() -> None:
+    watch, theta = LimitWatch(ARM, 2.5, 4.0), [0.0] * N
+    assert not watch.obstacle(theta)
+    theta[0] = -76.0 / ARM.joint_from_motor[0]
+    assert watch.obstacle(theta).startswith("joint1 is at -76 rad, further beyond its stops, ")
 
 
 def test_an_arm_that_is_driven_into_a_stop_is_stopped() -> None:
