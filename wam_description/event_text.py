@@ -88,6 +88,7 @@ BUS: Final = {  # by cause of a fault on the bus of a real arm
     "index": "motor controller {node} would take the torque of another motor; correct its property {detail}",
     "not_zeroed": "motor controller {node} is at {detail} counts, not those of the home pose; start there again",
     "no_reply": "motor controller {node} sends no position; check its cable",
+    "no_mode": "motor controller {node} does not answer with its mode; check its cable",
     "jump": "the position of motor {node} jumps; check its encoder, then start in the home pose again",
     "reset": "motor controller {node} was reset; its zero is lost; check its power, then start in the home pose again",
     "all_silent": "the safety module answers, but no motor controller does; check the cable of the bus",

@@ -24,6 +24,7 @@ class BusFault(StrEnum):
     NOT_ZEROED = "bus_not_zeroed"
     # later
     NO_REPLY = "bus_no_reply"
+    NO_MODE = "bus_no_mode"
     JUMP = "bus_jump"
     RESET = "bus_reset"
     ALL_SILENT = "bus_all_silent"

@@ -1,5 +1,6 @@
 """What is sent and taken in each period once the arm is started."""
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 
 from wam_description.event import Value
@@ -25,6 +26,7 @@ class Cycle:
     ----------
     safety_mode : of the safety module.
     is_released : whether the controllers follow torques.
+    is_zero_lost : whether the position of a motor has jumped.
     """
 
     def __init__(self, host: Host, motors: Sequence[Motor], period: float) -> None:
@@ -33,6 +35,8 @@ class Cycle:
         self.safety_mode: int = SafetyMode.IDLE
         self._patience = BUS.collect * period + host.line.slack
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
+        self._unanswered: Counter[int] = Counter()  # questions in a row for the mode, by node
+        self.is_zero_lost = False
         self._was_released = False  # when the modes were requested last
         self._torque, self._mode = host.number(BusGroup.MOTORS, "T"), host.number(BusGroup.MOTORS, "MODE")
         # the pendant first: it states why the mode changes
@@ -78,7 +82,7 @@ class Cycle:
                 del awaited[frame.identifier]
                 if not awaited:
                     return
-        self._judge(awaited.values())
+        self._judge(awaited.values(), max(1, round((host.now() - requested) / self._period)))
 
     def _arriving(self, patience: float) -> Iterator[Frame]:
         """Frames, each waited for so long, s, but for a period in all; later only those that are there."""
@@ -96,12 +100,18 @@ class Cycle:
 
     def _poll(self) -> None:
         """Ask for the modes; that there was no answer to the last requests is a fault."""
-        if not self._is_answered:
+        if not self._is_answered or self._unanswered[SAFETY] >= BUS.attempts:
             self._fault(BusFault.SAFETY_SILENT)
+        if silent := [motor.node for motor in self.motors if self._unanswered[motor.node] >= BUS.attempts]:
+            self._fault(BusFault.NO_MODE, silent[0])
+        if self.is_zero_lost:  # now and then, as one may not arrive
+            self._host.put(SAFETY, "ZERO", 0)
         self._poll_at, self._was_released = self._host.now() + BUS.poll, self.is_released
         for request in self._requests[:-1]:
             self._host.send(request)
         self._is_answered = self._host.refused > 0  # then nothing is to be answered
+        if not self._is_answered:
+            self._unanswered.update([SAFETY, *(motor.node for motor in self.motors)])
 
     def _take(self, frame: Frame) -> frames.Value | None:
         """Take a frame, and return what a node answers in it."""
@@ -125,6 +135,7 @@ class Cycle:
         return found
 
     def _take_mode(self, node: int, mode: int) -> None:
+        self._unanswered[node] = 0
         if node == SAFETY:
             self._is_answered, self.safety_mode = True, mode
             if self.is_released and mode != SafetyMode.ACTIVE:
@@ -136,19 +147,25 @@ class Cycle:
         elif not self.is_released and mode != BUS.idle_mode:  # as after Shift-Activate
             self.brake(True)
 
-    def _judge(self, awaited: Collection[Motor]) -> None:
-        """Look for motors whose positions have not come for too long."""
+    def _judge(self, awaited: Collection[Motor], periods: int) -> None:
+        """Look for motors whose positions have not come for too long, now for some more periods."""
         self._host.counts["lost replies"] += len(awaited)
         for motor in awaited:
-            motor.missed += 1
+            motor.missed += periods
         silent = [motor for motor in awaited if motor.missed * self._period >= BUS.silent]
-        if not silent or self._host.trouble:
+        if not silent:
             return
+        self.is_zero_lost |= any(motor.has_jumped for motor in silent)
+        if self._host.trouble:
+            return
+        self.stop()  # first: to find out why takes some periods
         node = silent[0].node
         if self._host.refused:
             self._fault(BusFault.NOT_SENT, 0, self._host.refused)
         elif len(silent) == len(self.motors):
-            self._fault(self._host.silence(BusFault.ALL_SILENT))
+            fault = self._host.silence(BusFault.ALL_SILENT)
+            self._pendant = (fault == BusFault.ESTOP and self._host.ask(SAFETY, "PEN", 1)) or self._pendant
+            self._fault(fault)
         elif silent[0].has_jumped:
             self._fault(BusFault.JUMP, node)
         else:
