@@ -47,7 +47,7 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
     host, arm = list[Any](can.Bus(interface=interface, channel=channel) for _ in range(2))
     begin, send = 0, host.send
     arm_of_start = SimulatedBus(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE)
-    driver = ArmBus(arm_of_start, CONFIGURATION.shared.arm, PERIOD)
+    driver = ArmBus(arm_of_start, CONFIGURATION.shared.arm, PERIOD, CONFIGURATION.shared.arm.joints.start)
     while not driver.is_running:
         driver.exchange()
     numbers, of_safety = properties.numbers(FIRMWARE), properties.numbers(FIRMWARE, True)

@@ -70,7 +70,7 @@ class Rig:
         self.plant.reset()
         arm = self.shared.arm
         self.bus = SimulatedBus(self.shared, own, version, self.plant)
-        self.arm = ArmBus(via(self.bus), arm, PERIOD)
+        self.arm = ArmBus(via(self.bus), arm, PERIOD, arm.joints.start)
         self.currents = [0.1 + 0.05 * at for at in range(len(arm.motors.names))]
 
     def start(self, most: float = 5.0) -> list[Wait]:
@@ -318,10 +318,10 @@ def extra_motor(rig: Rig, draw: random.Random) -> None:
     rig.bus.controllers[5] = SimulatedController(5, NEW)
 
 
-def press(button: SafetyMode) -> Inject:
+def press(button: SafetyMode, *faulty: str) -> Inject:
     def inject(rig: Rig, draw: random.Random) -> None:
         rig.bus.is_attended = False
-        rig.bus.switch(button)
+        rig.bus.switch(button, *faulty)
 
     return inject
 
@@ -424,6 +424,56 @@ def test_an_adapter_that_takes_nothing_more_is_stopped_by_the_heartbeat() -> Non
     assert rig.arm.trouble is not None
     assert rig.arm.trouble.cause == BusFault.NOT_SENT
     assert last - begun <= 0.11
+
+
+@pytest.mark.parametrize("periods", [3, 6, 9])
+def test_an_estop_is_explained_at_any_time(periods: int) -> None:
+    rig = Rig()
+    rig.enable()
+    rig.run(periods * PERIOD)
+    press(SafetyMode.ESTOP, "heartbeat")(rig, random.Random(0))
+    rig.run(0.03)
+    assert rig.arm.trouble is not None
+    assert "a fault of the heartbeat" in sentence(rig.arm.trouble)
+
+
+def test_the_torque_ends_before_the_driver_asks_why() -> None:
+    rig, sent = Rig(), list[Frame]()
+    rig.enable()
+    rig.bus.on_line = lambda frame: [] if frame.sender == 2 else [*(sent.append(frame) or (frame,))]
+    rig.run(0.02)
+    why = sent.index(frames.get(2, 5))
+    assert frames.put(BusGroup.MOTORS, 8, BUS.idle_mode) in sent[:why]
+
+
+def test_a_controller_that_no_longer_states_its_mode_is_a_fault() -> None:
+    rig = Rig()
+    rig.enable()
+    rig.bus.controllers[2].values["MODE"] = BUS.idle_mode
+    rig.bus.on_line = lambda frame: [] if (frame.sender, frame.receiver) == (2, BusGroup.VALUES) else [frame]
+    rig.run((BUS.attempts + 1) * BUS.poll + 2 * PERIOD)
+    assert rig.arm.trouble is not None
+    assert rig.arm.trouble.cause == BusFault.NO_MODE
+
+
+def test_a_lost_wake_up_is_repeated() -> None:
+    rig, lost = Rig(), list[Frame]()
+    rig.bus.controllers[2].values["STAT"] = 0
+    rig.bus.on_line = lambda frame: (
+        [frame] if lost or frame != frames.put(2, 5, BUS.ready) else lost.append(frame) or []
+    )
+    assert rig.start()[-1] is Wait.HOME
+
+
+def test_a_zero_that_a_jump_has_lost_is_set_again_also_by_the_next_driver() -> None:
+    rig = Rig()
+    rig.enable()
+    rig.bus.controllers[1].values["P"] += 20 * 4096
+    rig.run(0.05)
+    rig.arm.clear()
+    for _ in range(2):
+        assert rig.start(2.0)[-1] is Wait.HOME
+        rig.arm.begin()
 
 
 def test_at_its_end_the_driver_leaves_no_active_arm_without_a_heartbeat() -> None:

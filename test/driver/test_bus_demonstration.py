@@ -37,7 +37,8 @@ class PlantOnBus:
 
     def __init__(self, plant: Plant, shared: Shared, own: DriverParameters) -> None:
         self._plant, self._constant, self._is_braked = plant, shared.arm.motors.torque_constant, True
-        self._arm = ArmBus(SimulatedBus(shared, own, plant=plant), shared.arm, shared.timing.period)
+        line, arm = SimulatedBus(shared, own, plant=plant), shared.arm
+        self._arm = ArmBus(line, arm, shared.timing.period, arm.joints.start)
         plant.brake(True)
         while self._arm.wait is not Wait.NOTHING:
             self._exchange()
@@ -78,7 +79,7 @@ class DriverOnBus(Driver):
 def at_rates_of_the_bus(name: str) -> Configuration:
     """The configuration of the plain arm with rates and gains of that on its bus."""
     plain, on_bus = Configuration.load(packaged(name)), Configuration.load(packaged(f"{name}-bus"))
-    own = ("interface", "channel", "nodes", "timing.mode")
+    own = ("interface", "channel", "home", "nodes", "timing.mode")
     changed = {
         (key if node == SHARED else f"{node}:{key}"): value
         for node, flat in on_bus.sections.items()

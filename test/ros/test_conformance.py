@@ -137,11 +137,17 @@ def test_the_driver_of_a_real_arm_states_what_a_person_has_to_do_and_which_fault
     assert not driver.hardware.confirm_home()
     bus.switch(SafetyMode.IDLE)
     wait_for("call confirm_home", Level.WARN)
-    assert "put the arm at its home pose" in driver.enable().message
+    assert "put the arm at its home pose, 0, -2, 0, 3.13 rad, hold" in driver.enable().message
+    exchange, publish, published = driver.hardware.exchange, driver._publish, list[int]()
+    driver.hardware.exchange = lambda periods: time.sleep(0.01) or exchange(periods)  # as the start of a real arm
+    driver._publish = lambda periods: published.append(periods) or publish(periods)
     assert driver.hardware.confirm_home()
     wait_for("press Shift-Activate", Level.WARN)
     ros.wait(lambda: driver.hardware.is_running)
     assert not driver.health.is_ready, "a scenario waits"
+    ros.wait(lambda: published)
+    assert published[0] == 1, "nothing before the first state"
+    driver.hardware.exchange = exchange
     bus.switch(SafetyMode.ACTIVE)
     ros.wait(lambda: not driver.unready and driver.health.is_ready)
     bus.on_line = lambda frame: [] if frame.sender == 2 else [frame]

@@ -20,8 +20,9 @@ class ArmBus:
     Parameters
     ----------
     line : to the bus.
-    arm : its torque constants convert amperes to torques; its start is the home pose.
+    arm : its torque constants convert amperes to torques.
     period : s, between two calls of `exchange`.
+    home : angles of the joints at the home pose, rad.
 
     Attributes
     ----------
@@ -29,16 +30,18 @@ class ArmBus:
     counts : lost replies, frames that were not sent, and other things that are no fault if they are rare.
     """
 
-    def __init__(self, line: Line, arm: Arm, period: float) -> None:
-        self._line, self._arm, self._period = line, arm, period
+    def __init__(self, line: Line, arm: Arm, period: float, home: Sequence[float]) -> None:
+        self._line, self._arm, self._period, self._home = line, arm, period, home
         self.counts = line.counts
+        self._cycle: Cycle | None = None
         self.begin()
 
     def begin(self) -> None:
         """Begin the start-up, also once more."""
-        self._host = StartUp(self._line, self._arm)
+        is_zero_lost = self._cycle is not None and self._cycle.is_zero_lost
+        self._host = StartUp(self._line, self._arm, self._home, is_zero_lost)
         self._steps = self._host.steps()
-        self._cycle: Cycle | None = None
+        self._cycle = None
         self.wait = Wait.POWER
 
     def clear(self) -> None:
@@ -75,10 +78,10 @@ class ArmBus:
     @property
     def advice(self) -> str:
         """What a person has to do, in words; '' where nothing."""
-        woken = self._host.woken
+        woken, text = self._host.woken, self.wait.value.format(home=", ".join(f"{angle:g}" for angle in self._home))
         if woken and self.wait is Wait.HOME:
-            return f"{self.wait.value}; motor controllers that lost their position: {', '.join(map(str, woken))}"
-        return self.wait.value
+            return f"{text}; motor controllers that lost their position: {', '.join(map(str, woken))}"
+        return text
 
     def brake(self, on: bool) -> None:
         """Command zero torque and let the windings brake, or not; this arm has no brakes, it sinks."""

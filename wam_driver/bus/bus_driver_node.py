@@ -45,7 +45,7 @@ class BusDriver(ArmDriver):
         """The motors: those of the production WAM on its bus."""
         if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
-        return ArmBus(line_of(shared, own, time), shared.arm, shared.timing.period)
+        return ArmBus(line_of(shared, own, time), shared.arm, shared.timing.period, own.home)
 
     @property
     def stamp(self) -> int:
@@ -67,9 +67,10 @@ class BusDriver(ArmDriver):
         if self.safety.mode is Mode.ENABLED and age >= self._watchdog:
             cure = f"{due - 1} periods missed; check that velocity_loop runs"
             self.trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
+        was_running = hardware.is_running
         hardware.exchange(due)
         if hardware.is_running:
-            self._publish(due)
+            self._publish(due if was_running else 1)  # before, there was no state
         if hardware.trouble:
             self.trip(hardware.trouble)
         self.announce()
@@ -124,12 +125,10 @@ class BusDriver(ArmDriver):
                 self.hardware.command(currents)
 
     def obstacle(self) -> str:
-        """Whether no commands come."""
-        return (
-            ""
-            if time.perf_counter() - self._came < self._watchdog
-            else "no motor_current_command arrives; start velocity_loop, then enable"
-        )
+        """Whether no commands come, or the arm cannot be where its driver believes it to be."""
+        if time.perf_counter() - self._came >= self._watchdog:
+            return "no motor_current_command arrives; start velocity_loop, then enable"
+        return self._limits.obstacle(self.hardware.state.position)
 
     def _release(self) -> None:
         self._command_stamp = self.stamp

@@ -29,7 +29,7 @@ def sent(shared: Shared, own: BusParameters, version: int) -> Iterator[str]:
     """
     bus = SimulatedBus(shared, own, version)
     bus.switch(SafetyMode.ESTOP)
-    arm = ArmBus(bus, shared.arm, shared.timing.period)
+    arm = ArmBus(bus, shared.arm, shared.timing.period, own.home)
     parts, remark = defaultdict[str, list[Frame]](list), ""
 
     def overhear(frame: Frame) -> list[Frame]:

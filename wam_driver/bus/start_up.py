@@ -26,7 +26,7 @@ class Wait(Enum):
     POWER = "nothing answers on the bus: turn on the arm, connect the bus"
     IDLE = "release the E-stop and press Shift-Idle on the pendant"
     WAKE = "the motor controllers wake up"
-    HOME = "put the arm at its home pose, hold it there and call confirm_home"
+    HOME = "put the arm at its home pose, {home} rad, hold it there and call confirm_home"
     ACTIVATE = "support the arm, press Shift-Activate on the pendant, then enable"
     NOTHING = ""
 
@@ -36,8 +36,8 @@ class StartUp(Host):
 
     Parameters
     ----------
-    line : to the bus.
-    arm : as that of `ArmBus`.
+    line, arm, home : as those of `ArmBus`.
+    is_zero_lost : a position has jumped, so that the zero is unknown, also in later starts.
 
     Attributes
     ----------
@@ -45,9 +45,9 @@ class StartUp(Host):
     woken : controllers that this start has woken.
     """
 
-    def __init__(self, line: Line, arm: Arm) -> None:
+    def __init__(self, line: Line, arm: Arm, home: Sequence[float], is_zero_lost: bool = False) -> None:
         super().__init__(line)
-        self._home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
+        self._home, self._is_zero_lost = TransmissionMap.of(arm).motor_positions(home), is_zero_lost
         self._constant = arm.motors.torque_constant
         self._motors = range(1, len(self._home) + 1)
         self.is_at_home, self.woken = False, list[int]()
@@ -62,6 +62,8 @@ class StartUp(Host):
         """
         yield from self._await_idle()
         yield Wait.WAKE
+        if self._is_zero_lost:
+            self.write(SAFETY, "ZERO", 0)
         self._find()
         for name in ("VL1", "VL2", "TL1", "TL2"):  # as the safety module has stored them
             for what in ("DEF", "LOAD"):
@@ -69,7 +71,7 @@ class StartUp(Host):
         yield from self._wake()
         limit = min(self.demand(SAFETY, "TL1", TORQUES, BusFault.LIMIT), BUS.largest_torque)
         motors = [self._read(node, limit) for node in self._motors]
-        if self.woken or self.demand(SAFETY, "ZERO") != 1:
+        if self.woken or self._is_zero_lost or self.demand(SAFETY, "ZERO") != 1:
             while not self.is_at_home:
                 yield Wait.HOME
             self._set_zero(motors)
@@ -101,13 +103,15 @@ class StartUp(Host):
 
     def _wake(self) -> Iterator[Wait]:
         """Wake those that sleep; as they have lost their counts, the zero is unknown, also in later starts."""
-        self.woken = [node for node in self._motors if self.demand(node, "STAT") != BUS.ready]
-        for node in self.woken:
-            self.write(SAFETY, "ZERO", 0)
-            self.write(node, "STAT", BUS.ready)
-        end = self.now() + BUS.silence
-        while self.woken and self.now() < end:
-            yield Wait.WAKE
+        asleep = self.woken = [node for node in self._motors if self.demand(node, "STAT") != BUS.ready]
+        for _ in range(BUS.attempts):
+            for node in asleep:
+                self.write(SAFETY, "ZERO", 0)
+                self.write(node, "STAT", BUS.ready)
+            end = self.now() + BUS.silence
+            while asleep and self.now() < end:
+                yield Wait.WAKE
+            asleep = [node for node in asleep if self.ask(node, "STAT") != BUS.ready]
         for node in self.woken:
             self.demand(node, "STAT", [BUS.ready], BusFault.NOT_AWAKE)
         self.write(BusGroup.MOTORS, "MODE", BUS.idle_mode)
