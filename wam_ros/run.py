@@ -132,7 +132,7 @@ class Connection(Closing):
         self.executor: Any = Executor(context=self.context)
         self.listener_gone = False
         self.nodes: dict[str, Any] = {}
-        self._nodes: list[Node] = []
+        self._nodes: dict[Node, str] = {}  # and their names, which a destroyed node does not have
         self._pulse_end = threading.Event()
         self._pulse = threading.Thread(target=self._keep_awake, name="pulse", daemon=True)
         self._pulse.start()
@@ -174,13 +174,13 @@ class Connection(Closing):
 
     def add(self, node: Any) -> Any:
         """Take a node into the executor; it is destroyed with the connection."""
-        self._nodes.append(node)
+        self._nodes[node] = node.get_name()
         self.executor.add_node(node)
         return node
 
     def remove(self, node: Any) -> None:
         """Destroy a node now."""
-        self._nodes.remove(node)
+        del self._nodes[node]
         self.executor.remove_node(node)
         node.destroy_node()
 
@@ -208,7 +208,7 @@ class Connection(Closing):
         self._pulse_end.set()
         self._pulse.join()
         self.context.end = time.monotonic() + (limits.short_delivery if self.listener_gone else limits.delivery)
-        for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
+        for node in sorted(self._nodes, key=lambda node: (self._nodes[node] == LAST) - (self._nodes[node] == FIRST)):
             self.remove(node)
         with leaving(self.context):  # an events executor has kept the nodes, and with them the participant
             self.executor.shutdown()

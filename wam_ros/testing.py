@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import yaml
+from rclpy.node import Node
 from rclpy.publisher import Publisher
+from std_srvs.srv import SetBool, Trigger
 
 from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
@@ -25,8 +27,8 @@ from wam_description.defects import UnusableOutput, defect_finder, output_check
 from wam_description.interface import Interface, declared, is_packaged, require_parameters
 from wam_description.parameters import ParameterError, dotted, meant, require
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
+from wam_description.status import REFUSED
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH, Topic
-from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
@@ -115,7 +117,8 @@ class RunningArm:
         self._composition: Composition | None = None
         self._has_ended = False
         self.fault = ""
-        self._expected: set[str] = set()  # topics of which messages may be refused
+        self._expected: set[str] = set()  # topics of which messages may be refused, until that ends
+        self._known: dict[str, int] = {}  # refused messages that were expected, by topic
 
     def start(
         self, *own: Any, configuration: str | Path | Configuration = "wam", nodes: Sequence[str] = (), **values: Any
@@ -232,6 +235,7 @@ class RunningArm:
 
     def add(self, node: Any) -> Any:
         """Spin a plain rclpy node, too.  Make it with ``context=arm.context``; it ends with the test."""
+        require(isinstance(node, Node), f"{node!r} is no node of rclpy; give one, made with context=arm.context")
         return self._require_start().add(node)
 
     def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
@@ -269,6 +273,8 @@ class RunningArm:
                     at = f"at {stamp / SECOND:.3f} s joint_states is {q and [round(x, 4) for x in q.position]}"
                     raise AssertionError(f"not met within {waited}: {what or _source(condition)}; {at}")
             self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
+            if not self._present_fault():
+                self.fault = ""  # it is over; the next one is another one
 
     def run(self, seconds: float) -> None:
         """Spin for a time of the arm, s, from now on."""
@@ -284,21 +290,42 @@ class RunningArm:
         return self.fault
 
     def run_until_refused(self, topic: str, seconds: float = TEST_LIMITS.arm_time) -> str:
-        """Spin until a node refuses a message of a topic, which the test expects; returns the node and its reason."""
-        self._expected.add(self._row(topic).name)
-        self._spin(lambda: topic in self._refusals(), seconds, self._look, f"that a node refuses {topic}")
-        return self._refusals()[topic]
+        """Spin until a node refuses a message of a topic, which the test expects; returns the node and its reason.
 
-    def _refusals(self) -> dict[str, str]:
-        """The node that refused a message last and its reason, by topic; this kit looks at what no node takes."""
-        found = ((name, node.health.refusals) for name, node in self.nodes.items() if hasattr(node, "health"))
-        refused = {topic: f"{name}: {one.reason}" for name, refusals in found for topic, one in refusals.items()}
+        The test expects the refusals that follow, too, until the status of the node leaves them out.
+        """
+        self._row(topic)
+
+        def is_refused() -> bool:
+            count, _ = self._refusals().get(topic, (0, ""))
+            return count > self._known.get(topic, 0)
+
+        self._spin(is_refused, seconds, self._look, f"that a node refuses {topic}")
+        self._expected.add(topic)
+        return self._refusals()[topic][1]
+
+    def _refusals(self) -> dict[str, tuple[int, str]]:
+        """By topic, how many messages were refused, and the last reason; this kit looks at what no node takes."""
+        refused: dict[str, tuple[int, str]] = {}
+        for name, node in self.nodes.items():
+            for topic, one in node.health.refusals.items() if hasattr(node, "health") else ():
+                refused[topic] = one.count + refused.get(topic, (0, ""))[0], f"{name}: {one.reason}"
         for topic in self._untaken:
             try:
                 self.newest(topic)
             except ArmFault as fault:
-                refused[topic] = f"the test, as no node takes it: {fault}"
+                refused[topic] = len(self.recorded.data[topic]), f"the test, as no node takes it: {fault}"
         return refused
+
+    def _forget_ended(self, refusals: Mapping[str, tuple[int, str]]) -> None:
+        """Expect no further refusals of a topic that no status states, and of which no message was refused again."""
+        healths = [node.health for node in self.nodes.values() if hasattr(node, "health")]
+        stated = {topic for health in healths for topic in health.status.facts.get(REFUSED, "").split(", ")}
+        for topic in list(self._expected):
+            count, _ = refusals.get(topic, (0, ""))
+            if topic not in stated and count == self._known.get(topic):
+                self._expected.remove(topic)
+            self._known[topic] = count
 
     def _present_fault(self) -> str:
         return str(self._driver.safety.fault) if self._driver else ""
@@ -306,7 +333,13 @@ class RunningArm:
     def _look(self) -> None:
         if (fault := self._present_fault()) not in ("", self.fault):
             raise ArmFault(fault)
-        unexpected = {topic: why for topic, why in self._refusals().items() if topic not in self._expected}
+        refusals = self._refusals()
+        self._forget_ended(refusals)
+        unexpected = {
+            topic: why
+            for topic, (count, why) in refusals.items()
+            if topic not in self._expected and count > self._known.get(topic, 0)
+        }
         if unexpected and self._is_lockstep:  # in realtime a busy computer may be late
             raise ArmFault("; ".join(f"{topic} is refused by {why}" for topic, why in unexpected.items()))
 
@@ -319,16 +352,15 @@ class RunningArm:
             where there is no such service, with a switch or without.
         """
         self._require_start()
-        kinds = {"std_srvs/srv/Trigger": "no value", "std_srvs/srv/SetBool": "True or False"}
+        kinds = {"std_srvs/srv/Trigger": Trigger, "std_srvs/srv/SetBool": SetBool}
         found = self.node.get_service_names_and_types()
         there = {name.removeprefix(f"/{NAMESPACE}/"): kinds[kind] for name, (kind, *_) in found if kind in kinds}
         require(service in there, f"no service is named '{service}'; there are {', '.join(there)}")
-        taken = there[service]
-        require((taken == "no value") == (switch is None), f"'{service}' takes {taken}")
-        node, _, name = service.partition("/")
-        client, message = self._client.service(Call(node, name, switch))
+        client, is_trigger = self._client.client(there[service], service), there[service] is Trigger
+        fits = switch is None if is_trigger else isinstance(switch, bool)
+        require(fits, f"'{service}' takes {'no value' if is_trigger else 'True or False'}")
         self.run_until(client.service_is_ready)
-        future = client.call_async(message)
+        future = client.call_async(Trigger.Request() if is_trigger else SetBool.Request(data=switch))
         self._spin(future.done, TEST_LIMITS.arm_time, lambda: None)  # a fault that it causes is no failure of the call
         return future.result()
 
@@ -340,7 +372,9 @@ class RunningArm:
         ArmFault
             where the driver refuses it.
         """
-        self.run_until(lambda: self.stamp > 0 and not self.nodes["driver"].unready)
+        self._require_start()
+        node = self.nodes["driver"]
+        self.run_until(lambda: self.stamp > 0 and not node.unready and not node.is_waiting())
         answer = self.call("driver/enable", True)
         if not answer.success:
             raise ArmFault(answer.message)
@@ -362,7 +396,10 @@ class RunningArm:
             where there is no such topic, the time is negative, no message can have the value, or it is unusable and no
             node takes the topic.
         """
-        require(seconds >= 0.0, f"seconds is {seconds:g}; give the time in which {topic} is sent again, 0 for once")
+        require(
+            0.0 <= seconds < math.inf,
+            f"seconds is {seconds:g}; give the time in which {topic} is sent again, 0 for once",
+        )
         made, row = self.value(topic, **fields), self._row(topic)
         self.publisher(topic)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
@@ -464,6 +501,7 @@ def configured(
     *own: Any, configuration: str | Path | Configuration = "wam", nodes: Sequence[str] = (), **values: Any
 ) -> Configuration:
     """A configuration in lockstep without a pace, with nodes and values as `RunningArm.start` takes them."""
+    require(not isinstance(nodes, str), f"nodes is '{nodes}'; give a list, as ['{nodes}']")
     base = configuration
     if not isinstance(base, Configuration):
         path = Path(base)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 from wam_control.velocity.gravity_node import GravityNode
 from wam_description.arm import Shared
@@ -108,6 +109,7 @@ def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningAr
         ("joint_posture_command", {"positions": [0.0]}, "no field 'positions'; it has position, velocity, effort"),
         ("joint_posture_command", {"position": 0.3}, "unusable .*: position is 0.3; give a list of floats"),
         ("joint_posture_command", {"seconds": -1.0}, "seconds is -1; give the time"),
+        ("joint_posture_command", {"seconds": math.inf}, "seconds is inf; give the time"),
         ("joint_trajectory", {}, "is a trajectory_msgs/msg/JointTrajectory; publish it with a node .*JointState, "),
         ("sim/disturbance", {"force": (0.0, 5.0)}, "unusable sim/disturbance: .*; send three numbers for each"),
     ):
@@ -152,6 +154,12 @@ def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_takes_its_t
     assert re.match(f"{taker}: .*{text}", arm.run_until_refused(topic))
     arm.run_until(lambda: arm.status(taker).level is Level.WARN)
     assert arm.status(taker).facts["refused"] == topic
+    arm.run_until(lambda: arm.status(taker).level is Level.OK)
+    with pytest.raises(AssertionError, match="that a node refuses"):
+        arm.run_until_refused(topic, 0.1)
+    arm.publisher(topic).publish(encoder(BY_NAME[topic], arm.configuration.shared)(stamp, value))
+    with pytest.raises(ArmFault, match=f"{topic} is refused by {taker}"):
+        arm.run(0.1)
 
 
 def test_a_posture_without_a_stamp_counts_as_now_and_the_status_says_so(arm: RunningArm) -> None:
@@ -186,11 +194,20 @@ def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
     node.create_subscription(JointState, "joint_states", heard.append, 10)
     arm.nodes["transform"].outlets.publish("joint_states", 1, State([0.0] * 4, [0.0] * 4, []))
     assert written["joint_states"] == before + 1
+    node.create_service(Trigger, "hello", lambda request, answer: answer)
+    arm.run_until(lambda: "/wam/hello" in dict(arm.node.get_service_names_and_types()))
+    assert not arm.call("hello").success
+    with pytest.raises(ValueError, match="3 is no node of rclpy"):
+        arm.add(3)
+    node.destroy_node()
+    arm.close()
+    assert not is_inhabited(requested_domain())
 
 
 def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     arm.enable()
     takes = {("driver/estop", True): "'driver/estop' takes no value", ("driver/enable",): "takes True or False"}
+    takes["driver/enable", 1] = "takes True or False"
     for words in (("driver/estp",), ("estop",), *takes):
         with pytest.raises(ValueError, match=takes.get(words, f"is named '{words[0]}'; there are .*driver/")):
             arm.call(*words)
@@ -200,9 +217,19 @@ def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
     assert arm.run_until_fault() == "emergency stop"
     arm.run(0.1)
     assert (arm.status("driver").level, arm.status("driver").fault) == (Level.ERROR, "emergency stop")
+    for service in ("driver/reset_fault", "driver/estop"):
+        arm.call(service)
+    with pytest.raises(ArmFault, match="emergency stop"):
+        arm.run(0.1)
+    arm.run_until_fault()
     arm.send("sim/disturbance", frame="outer_lnk", force=(0.0, 1.0, 0.0))
     with pytest.raises(ArmFault, match=r"sim/disturbance is refused by driver: .*outer_lnk"):
         arm.run(0.1)
+
+
+def test_an_arm_in_realtime_is_enabled_once_it_can_be(arm: RunningArm) -> None:
+    arm.start(nodes=INNER, timing={"mode": "realtime"}, driver={"late_periods": 0.99})
+    arm.enable()
 
 
 def test_a_number_that_is_none_is_an_exception_though_no_node_takes_it(arm: RunningArm) -> None:
@@ -243,6 +270,7 @@ def test_a_condition_that_does_not_come_fails(arm: RunningArm, monkeypatch: pyte
     ({"force_loop": Damping.__new__(Damping)}, "is no node; give its class, or 'module:Class'"),
     ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
     ({"timing": {"period": -1.0}}, "period"),
+    ({"nodes": "driver"}, r"give a list, as \['driver'\]"),
     ({"force_loop": Damping, "damping": {"gan": 1.0}}, "^a value that you set.*damping.*gan"),
     ({"force_loop": Named}, "has the name .* 'force_loop': give it another"),
     ({"driver": {"sensors.encoder_noise": [0.0] * 9}}, "it needs 4"),  # by the node itself
