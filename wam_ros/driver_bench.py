@@ -70,10 +70,12 @@ class DriverBench(StackClient):
     least_share : as `share`.
     longest_pause : s, in which this node itself did not run.
     end, restart : end the driver as SIGTERM does and start it again; None where it is not ours to end.
+    look_after : called again and again; it may raise what ends the test.
     """
 
     end: Restart | None = None
     restart: Restart | None = None
+    look_after: Restart = staticmethod(lambda: None)
 
     def __init__(
         self, shared: Shared, share: float, current: float, namespace: str = NAMESPACE, connection: Any = None
@@ -169,6 +171,7 @@ class DriverBench(StackClient):
     def spin_once(self, seconds: float = CONFORMANCE_LIMITS.spin) -> None:
         """As that of the client; a long time between the ends of two is a pause."""
         super().spin_once(seconds)
+        self.look_after()
         before, self._spun = self._spun, time.monotonic()
         self.longest_pause = max(self.longest_pause, self._spun - before)
 

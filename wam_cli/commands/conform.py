@@ -110,13 +110,19 @@ def run(given: argparse.Namespace) -> int:
         set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
         print(f"driver under test: {entry}; it logs the faults that this test causes")
 
-        def start() -> NodeProcess:
-            driver = NodeProcess(configuration, [entry], given.namespace)
-            ending.callback(driver.close)
-            return driver
+        drivers: list[NodeProcess] = []
+
+        def start() -> None:
+            drivers.append(NodeProcess(configuration, [entry], given.namespace))
+            ending.callback(drivers[-1].close)
+
+        def look_after() -> None:
+            if drivers and (code := drivers[-1].poll()) is not None:
+                raise ValueError(f"the driver has ended, with exit code {code}; correct what it has printed")
 
         if not given.running:
-            bench.end, bench.restart = start().close, start
+            start()
+            bench.end, bench.restart, bench.look_after = lambda: drivers.pop().close(), start, look_after
         for row in conformance_rows(bench, given.attempts):
             counts[row.verdict] += 1
             print(row.text, flush=True)
