@@ -40,17 +40,14 @@ def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) 
     assert re.fullmatch(r"wam_stack .+, inner loop: (compiled|plain Python)\n", out)
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        ("anlyse", "there is no 'anlyse'; did you mean 'analyse'?"),
-        ("xyzzy", "invalid choice: 'xyzzy' (choose from 'demo', 'up', "),
-        ("call enabel", "there is no 'enabel'; did you mean 'enable'?"),
-        ("evaluate contct", "there is no 'contct'; did you mean 'contact'?"),
-        ("demo --task creep", "no task is named 'creep'; choose from follow-surface"),
-        ("up --name left", "wam up: error: unrecognized arguments: --name left"),  # no abbreviation of --namespace
-    ],
-)
+@pytest.mark.parametrize(("words", "reason"), [
+    ("anlyse", "there is no 'anlyse'; did you mean 'analyse'?"),
+    ("xyzzy", "invalid choice: 'xyzzy' (choose from 'demo', 'up', "),
+    ("call enabel", "there is no 'enabel'; did you mean 'enable'?"),
+    ("evaluate contct", "there is no 'contct'; did you mean 'contact'?"),
+    ("demo --task creep", "no task is named 'creep'; choose from follow-surface"),
+    ("up --name left", "wam up: error: unrecognized arguments: --name left"),  # no abbreviation of --namespace
+])  # fmt: skip
 def test_a_word_that_does_not_exist_is_answered_with_the_one_that_was_meant(
     words: str, reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,18 +64,15 @@ def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -
     assert 'value="2.5"' in changed
 
 
-@pytest.mark.parametrize(
-    ("setting", "message"),
-    [
-        ("arm.links.mas=[2.5]", "to set to [2.5]; did you mean 'arm.links.mass'?"),
-        ("force_gain=[0.01]", "did you mean 'force_loop:force_gain'?"),
-        ("foo=1", "it has: ages.*, arm.*, "),
-        ("nothing", "write [node:]parameter=value"),
-        ("drivr:seed=1", "no section '/**/drivr'"),
-        ("force_loop:timing.period=0.01", "did you mean 'timing.period' of section '/**'?"),
-        ("arm.payload=20", "arm.joints.length and offset, and arm.payload, 20 kg"),
-    ],
-)
+@pytest.mark.parametrize(("setting", "message"), [
+    ("arm.links.mas=[2.5]", "to set to [2.5]; did you mean 'arm.links.mass'?"),
+    ("force_gain=[0.01]", "did you mean 'force_loop:force_gain'?"),
+    ("foo=1", "it has: ages.*, arm.*, "),
+    ("nothing", "write [node:]parameter=value"),
+    ("drivr:seed=1", "no section '/**/drivr'"),
+    ("force_loop:timing.period=0.01", "did you mean 'timing.period' of section '/**'?"),
+    ("arm.payload=20", "arm.joints.length and offset, and arm.payload, 20 kg"),
+])  # fmt: skip
 def test_a_number_that_cannot_be_changed_is_named(
     setting: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -99,15 +93,12 @@ def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     assert "it is empty; give a name or a file, or leave the option out" in err
 
 
-@pytest.mark.parametrize(
-    ("module", "way"),
-    [
-        ("rclpy", "pip install 'wam_stack[ros]'"),
-        ("quadprog", "pip install quadprog"),
-        ("pinocchio.visualize", "pip install pin"),
-        ("tf2_msgs", "apt install ros-jazzy-tf2-msgs"),
-    ],
-)
+@pytest.mark.parametrize(("module", "way"), [
+    ("rclpy", "pip install 'wam_stack[ros]'"),
+    ("quadprog", "pip install quadprog"),
+    ("pinocchio.visualize", "pip install pin"),
+    ("tf2_msgs", "apt install ros-jazzy-tf2-msgs"),
+])  # fmt: skip
 def test_a_package_that_is_missing_is_named_in_one_sentence(
     module: str, way: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

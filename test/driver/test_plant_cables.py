@@ -63,15 +63,11 @@ def damped(arm: Arm, damping: float = 0.06, **joints: tuple[float, ...]) -> Arm:
 # stiffness
 
 
-@pytest.mark.parametrize(
-    ("arm", "expected"),
-    [
-        (TESTBED, [14443 * IN_LB]),  # lb in/rad at the joint, section 5.6
-        # (A.5) with the assumed 34, 34, 34 and 11.8 N m/rad at the motors; both motors of the differential carry
-        (WAM, [29.97**2 * 34.0, 2 * 30.4**2 * 34.0, 2 * 15.2**2 * 34.0, 19.15**2 * 11.8]),
-    ],
-    ids=["testbed", "wam"],
-)
+@pytest.mark.parametrize(("arm", "expected"), [
+    (TESTBED, [14443 * IN_LB]),  # lb in/rad at the joint, section 5.6
+    # (A.5) with the assumed 34, 34, 34 and 11.8 N m/rad at the motors; both motors of the differential carry
+    (WAM, [29.97**2 * 34.0, 2 * 30.4**2 * 34.0, 2 * 15.2**2 * 34.0, 19.15**2 * 11.8]),
+], ids=["testbed", "wam"])  # fmt: skip
 def test_braked_joint_gives_way_as_its_cables_in_series(arm: Arm, expected: list[float]) -> None:
     """Static, so only as exact as the printed numbers and the settling: 0.5 %."""
     soft = changed(frictionless(arm), gravity=WEIGHTLESS, cables={"damping": (0.06,) * len(expected)})

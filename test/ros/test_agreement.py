@@ -29,18 +29,15 @@ def started_with(other: dict[str, Any]) -> str:
     return digests(WAM.with_values(other).shared)
 
 
-@pytest.mark.parametrize(
-    ("other", "names"),
-    [
-        (HEAVY, "another arm.payload than"),
-        ({"arm.gravity": [0.0, 0.0, -9.8]}, "another arm.gravity than"),
-        ({"arm.joints.upper": [2.6, 1.9, 2.7, 3.0]}, "another arm.joints.upper than"),
-        ({"timing.mode": "realtime"}, "another timing.mode than"),
-        ({"servo.integral_gain": [0.4] * 4}, "another servo.integral_gain than"),
-        ({"disturbance_force_limit": 7.0}, "another disturbance_force_limit than"),
-        (MANY, "another timing.dither_cycle, ages.command, arm.payload and 2 more than"),
-    ],
-)
+@pytest.mark.parametrize(("other", "names"), [
+    (HEAVY, "another arm.payload than"),
+    ({"arm.gravity": [0.0, 0.0, -9.8]}, "another arm.gravity than"),
+    ({"arm.joints.upper": [2.6, 1.9, 2.7, 3.0]}, "another arm.joints.upper than"),
+    ({"timing.mode": "realtime"}, "another timing.mode than"),
+    ({"servo.integral_gain": [0.4] * 4}, "another servo.integral_gain than"),
+    ({"disturbance_force_limit": 7.0}, "another disturbance_force_limit than"),
+    (MANY, "another timing.dither_cycle, ages.command, arm.payload and 2 more than"),
+])  # fmt: skip
 def test_a_node_that_was_started_with_other_values_is_named_with_them(other: dict[str, Any], names: str) -> None:
     reason = disagreement("gravity", OWN, started_with(other))
     assert reason == f"gravity was started with {names} the driver; start all nodes with the same configuration"

@@ -210,14 +210,11 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
     assert "argument --timeout: '-1' is not allowed" in called("echo", "status", "--timeout", "-1")[2]
 
 
-@pytest.mark.parametrize(
-    ("before", "words", "why"),
-    [
-        ("pause", "force_measured", "the arm is paused, and continues after 'wam call resume'"),
-        ("resume", "sim/disturbance", "no node publishes it now"),
-        ("resume", "force_measured --namespace nowhere", "no driver was found: there is an arm in /wam"),
-    ],
-)
+@pytest.mark.parametrize(("before", "words", "why"), [
+    ("pause", "force_measured", "the arm is paused, and continues after 'wam call resume'"),
+    ("resume", "sim/disturbance", "no node publishes it now"),
+    ("resume", "force_measured --namespace nowhere", "no driver was found: there is an arm in /wam"),
+])  # fmt: skip
 def test_a_topic_on_which_nothing_comes_ends_in_time_with_the_reason(
     before: str, words: str, why: str, stack: None
 ) -> None:

@@ -158,14 +158,11 @@ def test_the_driver_of_a_real_arm_states_what_a_person_has_to_do_and_which_fault
     assert console.rindex("Shift-Activate") < console.rindex("sends no position"), "not while a fault is latched"
 
 
-@pytest.mark.parametrize(
-    ("name", "limit", "quantity"),
-    [
-        ("driver:tip_speed_limit", 0.02, "speed of the tip"),
-        ("arm.joints.speed_limit", [0.02, 1.0, 1.0, 1.0], "speed of joint1"),
-        ("arm.joints.lower", [-0.02, -2.0, -2.8, -0.9], "travel of joint1"),
-    ],
-)
+@pytest.mark.parametrize(("name", "limit", "quantity"), [
+    ("driver:tip_speed_limit", 0.02, "speed of the tip"),
+    ("arm.joints.speed_limit", [0.02, 1.0, 1.0, 1.0], "speed of joint1"),
+    ("arm.joints.lower", [-0.02, -2.0, -2.8, -0.9], "travel of joint1"),
+])  # fmt: skip
 def test_a_real_arm_stops_above_a_limit(ros: Network, tmp_path: Path, name: str, limit: Any, quantity: str) -> None:
     loaded = on_bus(Configuration.load(packaged("barrett-wam4-bus")), "simulated:200")
     driver = Bench(ros, tmp_path, driver_alone(loaded.with_values({name: limit}))).driver

@@ -126,14 +126,11 @@ def test_a_trajectory_that_is_refused_is_in_the_status_until_it_ends(ros: Any, t
     feeder.feed_until(lambda: "domain" in feeder.facts()[0].message)
 
 
-@pytest.mark.parametrize(
-    ("topic", "message", "reason"),
-    [
-        ("force_command", lambda stamp: FORCE(stamp, Wrench("outer", ZERO, ZERO)), "frame_id is 'outer'"),
-        ("joint_posture_command", lambda stamp: joint_state(stamp, NAMES, State([0.0] * 3, [], [])), "has 3 values"),
-        ("joint_posture_command", lambda stamp: joint_state(stamp, [], State([0.0] * 4, [], [])), "is missing"),
-    ],
-)
+@pytest.mark.parametrize(("topic", "message", "reason"), [
+    ("force_command", lambda stamp: FORCE(stamp, Wrench("outer", ZERO, ZERO)), "frame_id is 'outer'"),
+    ("joint_posture_command", lambda stamp: joint_state(stamp, NAMES, State([0.0] * 3, [], [])), "has 3 values"),
+    ("joint_posture_command", lambda stamp: joint_state(stamp, [], State([0.0] * 4, [], [])), "is missing"),
+])  # fmt: skip
 def test_the_status_names_a_malformed_command_until_none_comes_any_more(
     topic: str, message: Callable[[int], Any], reason: str, ros: Any, tmp_path: Path
 ) -> None:

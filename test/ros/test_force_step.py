@@ -72,13 +72,10 @@ def stub(ros: Any, tmp_path: Path) -> Iterator[Stub]:
     found.example.communicate()
 
 
-@pytest.mark.parametrize(
-    ("mode", "fault", "text"),
-    [
-        ("fault", "emergency stop", "the driver stopped: emergency stop; call reset_fault, then start again\n"),
-        ("braked", "", "another program put on the brakes; start again\n"),
-    ],
-)
+@pytest.mark.parametrize(("mode", "fault", "text"), [
+    ("fault", "emergency stop", "the driver stopped: emergency stop; call reset_fault, then start again\n"),
+    ("braked", "", "another program put on the brakes; start again\n"),
+])  # fmt: skip
 def test_it_fails_where_the_arm_stops_under_it(mode: str, fault: str, text: str, stub: Stub) -> None:
     stub.ros.wait(lambda: len(stub.commands) > 20, what="commands of the example")
     stub.report("driver", Level.ERROR if fault else Level.OK, mode, mode, fault)

@@ -177,13 +177,10 @@ def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: Network, tmp
     assert "gravity has ended; start it again" in stack.fault
 
 
-@pytest.mark.parametrize(
-    ("topic", "names"),
-    [
-        ("joint_states", "/wam/intruder and /wam/transform publish joint_states"),
-        ("motor_states", "/wam/driver and /wam/intruder publish motor_states"),
-    ],
-)
+@pytest.mark.parametrize(("topic", "names"), [
+    ("joint_states", "/wam/intruder and /wam/transform publish joint_states"),
+    ("motor_states", "/wam/driver and /wam/intruder publish motor_states"),
+])  # fmt: skip
 def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     row = BY_NAME[topic]
@@ -241,15 +238,12 @@ def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
     monkeypatch.setattr(Slow, "count", time.monotonic)
 
 
-@pytest.mark.parametrize(
-    ("taken", "since", "named"),
-    [
-        ({"force_loop": 0.4, "transform": 0.05}, 0.02, "force_loop"),
-        ({"transform": 0.05, "force_loop": 0.4}, 0.02, "force_loop"),
-        ({"force_loop": 0.03}, 0.2, ""),
-        ({"force_loop": 0.01}, 0.0, ""),
-    ],
-)
+@pytest.mark.parametrize(("taken", "since", "named"), [
+    ({"force_loop": 0.4, "transform": 0.05}, 0.02, "force_loop"),
+    ({"transform": 0.05, "force_loop": 0.4}, 0.02, "force_loop"),
+    ({"force_loop": 0.03}, 0.2, ""),
+    ({"force_loop": 0.01}, 0.0, ""),
+])  # fmt: skip
 def test_the_longest_step_that_has_just_ended_holds_up_the_others(
     taken: dict[str, float], since: float, named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

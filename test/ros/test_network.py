@@ -327,13 +327,10 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     require_places(["velocity_loop"], "wam")
 
 
-@pytest.mark.parametrize(
-    ("name", "more", "text"),
-    [
-        ("driver", (), r"node 'driver' already runs in namespace /wam .* \(process \d+\); stop it"),
-        ("driver", ("-r", "__node:=other"), r"node 'other', section '/\*\*/other' .*: missing parameter"),
-    ],
-)
+@pytest.mark.parametrize(("name", "more", "text"), [
+    ("driver", (), r"node 'driver' already runs in namespace /wam .* \(process \d+\); stop it"),
+    ("driver", ("-r", "__node:=other"), r"node 'other', section '/\*\*/other' .*: missing parameter"),
+])  # fmt: skip
 def test_a_node_that_runs_already_or_was_renamed_is_refused(
     name: str, more: tuple[str, ...], text: str, ros: Any
 ) -> None:

@@ -206,19 +206,16 @@ def publishing(topic: str) -> Any:
 GRAVITY = "wam_control.velocity.gravity_node:GravityNode"
 
 
-@pytest.mark.parametrize(
-    ("more", "own", "text"),
-    [
-        (("force_loop",), {}, "'joint_velocity_command' has 2 publishers, impedance, force_loop"),
-        ((GRAVITY,), {}, "two nodes of the configuration are named 'gravity'"),
-        ((), {"lost": publishing("nowhere")}, "node 'lost' names the topic 'nowhere'"),
-        (
-            (),
-            {"lost": publishing("joint_posture_comand")},
-            r"'joint_posture_comand', .*did you mean 'joint_posture_command'\? topics = \(Topic\(...\),\) on the class",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("more", "own", "text"), [
+    (("force_loop",), {}, "'joint_velocity_command' has 2 publishers, impedance, force_loop"),
+    ((GRAVITY,), {}, "two nodes of the configuration are named 'gravity'"),
+    ((), {"lost": publishing("nowhere")}, "node 'lost' names the topic 'nowhere'"),
+    (
+        (),
+        {"lost": publishing("joint_posture_comand")},
+        r"'joint_posture_comand', .*did you mean 'joint_posture_command'\? topics = \(Topic\(...\),\) on the class",
+    ),
+])  # fmt: skip
 def test_nodes_that_do_not_fit_together_are_refused(
     more: tuple[str, ...], own: dict[str, Any], text: str, configured: Configuration
 ) -> None:
@@ -342,14 +339,11 @@ def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
     assert text in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("topic", "given", "taken"),
-    [
-        ("joint_effort_command", State((), np.array([]), np.full(2, 0.5)), State([], [], [0.5, 0.5])),  # type: ignore[arg-type]
-        ("force_command", Wrench("base", np.ones(3), [0] * 3), Wrench("base", (1.0,) * 3, (0.0,) * 3)),  # type: ignore[arg-type]
-        ("task_command", Table("base", np.array([[1.0, 2.0]])), Table("base", ((1.0, 2.0),))),  # type: ignore[arg-type]
-    ],
-)
+@pytest.mark.parametrize(("topic", "given", "taken"), [
+    ("joint_effort_command", State((), np.array([]), np.full(2, 0.5)), State([], [], [0.5, 0.5])),  # type: ignore[arg-type]
+    ("force_command", Wrench("base", np.ones(3), [0] * 3), Wrench("base", (1.0,) * 3, (0.0,) * 3)),  # type: ignore[arg-type]
+    ("task_command", Table("base", np.array([[1.0, 2.0]])), Table("base", ((1.0, 2.0),))),  # type: ignore[arg-type]
+])  # fmt: skip
 def test_a_node_may_return_arrays_of_numpy_as_well_as_lists(topic: str, given: Any, taken: Any) -> None:
     found = output_check("own", BY_NAME[topic])(given)
     assert repr(found) == repr(taken)

@@ -307,16 +307,13 @@ PROGRAMS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("program", "library", "number"),
-    [
-        ("node", "mujoco", signal.SIGINT),
-        ("demo", "mujoco", signal.SIGINT),
-        ("scorecard", "numpy", signal.SIGTERM),
-        ("live", "PIL", signal.SIGINT),
-        ("program", "pinocchio", signal.SIGINT),
-    ],
-)
+@pytest.mark.parametrize(("program", "library", "number"), [
+    ("node", "mujoco", signal.SIGINT),
+    ("demo", "mujoco", signal.SIGINT),
+    ("scorecard", "numpy", signal.SIGTERM),
+    ("live", "PIL", signal.SIGINT),
+    ("program", "pinocchio", signal.SIGINT),
+])  # fmt: skip
 def test_a_signal_during_start_up_ends_all_silently(
     program: str, library: str, number: signal.Signals, started: Any, domain_id: int
 ) -> None:

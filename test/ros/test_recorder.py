@@ -322,14 +322,11 @@ def by_hand(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
     return recorder(ros, directory, nodes=("driver", "gravity"), **choices)
 
 
-@pytest.mark.parametrize(
-    ("mode", "nodes", "difference"),
-    [
-        ("realtime", ["driver", "gravity"], "node driver runs in realtime, and this recorder in lockstep"),
-        ("lockstep", ["driver", "my:Own"], "only one of node driver and this recorder has gravity, my:Own in 'nodes'"),
-        ("lockstep", ["gravity", "driver", "recorder"], ""),
-    ],
-)
+@pytest.mark.parametrize(("mode", "nodes", "difference"), [
+    ("realtime", ["driver", "gravity"], "node driver runs in realtime, and this recorder in lockstep"),
+    ("lockstep", ["driver", "my:Own"], "only one of node driver and this recorder has gravity, my:Own in 'nodes'"),
+    ("lockstep", ["gravity", "driver", "recorder"], ""),
+])  # fmt: skip
 def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
     mode: str, nodes: list[str], difference: str, ros: Any, tmp_path: Path
 ) -> None:
@@ -346,15 +343,12 @@ def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
     assert node.failure == (difference and difference + advice)
 
 
-@pytest.mark.parametrize(
-    ("again", "named"),
-    [
-        ({}, ""),
-        ({"timing.real_time_factor": 0.5}, ""),
-        ({"gain": 2.0}, "gain"),
-        ({"timing.outer_divisor": 4, "arm.mass": [2.0]}, "arm.mass, timing.outer_divisor"),
-    ],
-)
+@pytest.mark.parametrize(("again", "named"), [
+    ({}, ""),
+    ({"timing.real_time_factor": 0.5}, ""),
+    ({"gain": 2.0}, "gain"),
+    ({"timing.outer_divisor": 4, "arm.mass": [2.0]}, "arm.mass, timing.outer_divisor"),
+])  # fmt: skip
 def test_a_node_that_is_started_again_otherwise_makes_the_bag_one_of_two_runs(
     again: dict[str, Any], named: str, ros: Any, tmp_path: Path
 ) -> None:
@@ -396,23 +390,20 @@ def test_an_unnamed_bag_is_named_after_arm_and_time(ros: Any, tmp_path: Path) ->
     assert (path / "metadata.yaml").is_file()
 
 
-@pytest.mark.parametrize(
-    ("numbers", "total", "dropped", "missed", "lacking"),
-    [
-        ([1, 2, 3], 3, 0, 0, 0),
-        ([1, 2, 3], 10, 0, 0, 7),
-        ([1, 2, 5, 6, 9], 9, 4, 0, 0),
-        ([7, 8, 10], 10, 1, 6, 0),  # a recorder that started later
-        ([7], 3, 0, 6, 0),
-        ([5, 6], 9, 0, 4, 3),
-        ([7, 8, 11], 14, 2, 6, 3),
-        ([1, 2, 3, 1, 2, 4], 2, 0, 0, 0),  # started again: 4 follows the 3 of the first life
-        ([1, 2, 9, 1, 2], 4, 6, 0, 2),
-        ([1, 1, 2, 2, 3, 3], 3, 0, 0, 0),  # two publishers under one name
-        ([1, 1, 2, 2, 3, 4, 3, 6], 6, 1, 0, 0),
-        ([0, 0], 5, 0, 0, 3),  # a middleware that does not number
-    ],
-)
+@pytest.mark.parametrize(("numbers", "total", "dropped", "missed", "lacking"), [
+    ([1, 2, 3], 3, 0, 0, 0),
+    ([1, 2, 3], 10, 0, 0, 7),
+    ([1, 2, 5, 6, 9], 9, 4, 0, 0),
+    ([7, 8, 10], 10, 1, 6, 0),  # a recorder that started later
+    ([7], 3, 0, 6, 0),
+    ([5, 6], 9, 0, 4, 3),
+    ([7, 8, 11], 14, 2, 6, 3),
+    ([1, 2, 3, 1, 2, 4], 2, 0, 0, 0),  # started again: 4 follows the 3 of the first life
+    ([1, 2, 9, 1, 2], 4, 6, 0, 2),
+    ([1, 1, 2, 2, 3, 3], 3, 0, 0, 0),  # two publishers under one name
+    ([1, 1, 2, 2, 3, 4, 3, 6], 6, 1, 0, 0),
+    ([0, 0], 5, 0, 0, 3),  # a middleware that does not number
+])  # fmt: skip
 def test_gaps_in_the_numbering_and_what_was_announced_and_has_not_come_are_losses(
     numbers: list[int], total: int, dropped: int, missed: int, lacking: int
 ) -> None:
@@ -565,16 +556,13 @@ ALL = list(range(1, 101))
 
 
 @pytest.mark.parametrize("present", [True, False])
-@pytest.mark.parametrize(
-    ("first", "second", "dropped", "missed", "lacking"),
-    [
-        ((ALL, 100), (ALL[:40], 30), 0, 0, 0),
-        ((ALL[:40], 40), (ALL, 70), 0, 0, 0),  # it is past its last total, which is above that of the first life
-        ((ALL, 100), (ALL[:10], 100), 0, 0, 90),
-        ((ALL[:90], 100), (ALL[:10], 15), 0, 0, 10 + 5),
-        ((ALL, 100), (ALL[9:20], 20), 0, 9, 0),  # before it was connected
-    ],
-)
+@pytest.mark.parametrize(("first", "second", "dropped", "missed", "lacking"), [
+    ((ALL, 100), (ALL[:40], 30), 0, 0, 0),
+    ((ALL[:40], 40), (ALL, 70), 0, 0, 0),  # it is past its last total, which is above that of the first life
+    ((ALL, 100), (ALL[:10], 100), 0, 0, 90),
+    ((ALL[:90], 100), (ALL[:10], 15), 0, 0, 10 + 5),
+    ((ALL, 100), (ALL[9:20], 20), 0, 9, 0),  # before it was connected
+])  # fmt: skip
 def test_losses_are_those_of_each_life_of_a_node(
     first: tuple[list[int], int], second: tuple[list[int], int], dropped: int, missed: int, lacking: int, present: bool
 ) -> None:

@@ -261,14 +261,11 @@ def test_a_trajectory_that_is_streamed_is_read_once() -> None:
 
 
 @pytest.mark.usefixtures("checked_fields")
-@pytest.mark.parametrize(
-    "status",
-    [
-        NodeStatus(Level.WARN, "domain I", "force_loop", connected=True, facts={"margin here": "1", "worst case": ""}),
-        NodeStatus(Level.ERROR, "fault: x", "driver", mode="fault", fault="x", stamp=5_000_000),
-        NodeStatus(Level.OK, "press", "scenario", step="press", stamp=1),
-    ],
-)
+@pytest.mark.parametrize("status", [
+    NodeStatus(Level.WARN, "domain I", "force_loop", connected=True, facts={"margin here": "1", "worst case": ""}),
+    NodeStatus(Level.ERROR, "fault: x", "driver", mode="fault", fault="x", stamp=5_000_000),
+    NodeStatus(Level.OK, "press", "scenario", step="press", stamp=1),
+])  # fmt: skip
 def test_a_status_is_the_same_after_a_round_trip(status: NodeStatus) -> None:
     assert status_of(bytes(serialize_message(diagnostic_status(status, "wam")))) == status
 

@@ -90,20 +90,16 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        (b"[" * 50_000, "nested more than 50 levels deep"),
-        (BOMB.encode(), "aliases are not read"),
-        (b"#" * 1_500_000, "at most 1048576 are read"),
-        (b"arm: {joints: ", "did not find expected"),
-        (b"!!python/object/apply:os.getcwd []", "could not determine a constructor"),
-        (b"\xff", "can't decode"),
-        (b"- 3", "it has no sections"),
-        (b"/wam/driver: 3", "not subscriptable"),
-    ],
-    ids=lambda value: value[:10] if isinstance(value, bytes) else "",
-)
+@pytest.mark.parametrize(("text", "reason"), [
+    (b"[" * 50_000, "nested more than 50 levels deep"),
+    (BOMB.encode(), "aliases are not read"),
+    (b"#" * 1_500_000, "at most 1048576 are read"),
+    (b"arm: {joints: ", "did not find expected"),
+    (b"!!python/object/apply:os.getcwd []", "could not determine a constructor"),
+    (b"\xff", "can't decode"),
+    (b"- 3", "it has no sections"),
+    (b"/wam/driver: 3", "not subscriptable"),
+], ids=lambda value: value[:10] if isinstance(value, bytes) else "")  # fmt: skip
 def test_parameters_that_are_no_parameters_are_refused_and_the_rest_of_the_bag_is_analysed(
     text: bytes, reason: str
 ) -> None:
