@@ -34,12 +34,14 @@ class ArmBus:
         self._line, self._arm, self._period, self._home = line, arm, period, home
         self.counts = line.counts
         self._cycle: Cycle | None = None
+        self._is_zero_lost = False  # by what the last cycle has seen
         self.begin()
 
     def begin(self) -> None:
         """Begin the start-up, also once more."""
-        is_zero_lost = self._cycle is not None and self._cycle.is_zero_lost
-        self._host = StartUp(self._line, self._arm, self._home, is_zero_lost)
+        if self._cycle:
+            self._is_zero_lost = self._cycle.is_zero_lost
+        self._host = StartUp(self._line, self._arm, self._home, self._is_zero_lost)
         self._steps = self._host.steps()
         self._cycle = None
         self.wait = Wait.POWER

@@ -82,7 +82,7 @@ class Cycle:
                 del awaited[frame.identifier]
                 if not awaited:
                     return
-        self._judge(awaited.values(), max(1, round((host.now() - requested) / self._period)))
+        self._judge(awaited.values())
 
     def _arriving(self, patience: float) -> Iterator[Frame]:
         """Frames, each waited for so long, s, but for a period in all; later only those that are there."""
@@ -147,11 +147,11 @@ class Cycle:
         elif not self.is_released and mode != BUS.idle_mode:  # as after Shift-Activate
             self.brake(True)
 
-    def _judge(self, awaited: Collection[Motor], periods: int) -> None:
-        """Look for motors whose positions have not come for too long, now for some more periods."""
+    def _judge(self, awaited: Collection[Motor]) -> None:
+        """Look for motors whose positions have not come for too long."""
         self._host.counts["lost replies"] += len(awaited)
         for motor in awaited:
-            motor.missed += periods
+            motor.missed += 1
         silent = [motor for motor in awaited if motor.missed * self._period >= BUS.silent]
         if not silent:
             return
