@@ -213,7 +213,10 @@ def test_without_a_driver_that_runs_the_command_says_how_to_start_one(
     assert text in capfd.readouterr().err
 
 
-def test_a_driver_that_ends_ends_the_test(capfd: pytest.CaptureFixture[str], domain_id: int) -> None:
+def test_a_driver_that_ends_ends_the_test(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], domain_id: int
+) -> None:
+    monkeypatch.setattr("wam_cli.commands.conform.set_priority", lambda *wanted: "")
     with pytest.raises(SystemExit):
         main(["conform", "--config", "barrett-wam4-bus", "--bus", "nowhere:can0"])
     assert "the driver has ended, with exit code 1" in capfd.readouterr().err
