@@ -127,7 +127,7 @@ def _compared(clock: Clock, reference: Clock, name: str) -> Clock:
 
 
 def _unset(stamps: Times, received: Times) -> tuple[Times, tuple[str, ...]]:
-    """Receptions by a clock that went on as the stamps did, and what is said where it was set."""
+    """Receptions by a clock that went on as the stamps did, and a note where it was set."""
     order = np.argsort(stamps, kind="stable")
     age = (received - stamps)[order]
     if not len(rows := _sets(received[order], stamps[order])):
