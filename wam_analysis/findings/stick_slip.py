@@ -180,12 +180,15 @@ def _lost_way(piece: Piece, unit: str) -> str:
         return ""
     moved, by = ways(piece, width)
     path = period * np.concatenate(([0.0], np.cumsum(np.abs(velocity[1:]))))
-    far, change = path[width:] - path[:-width], velocity[width:] - velocity[:-width]
-    left = np.abs(moved - by)
+    far, change = path[width:] - path[:-width], np.abs(velocity[width:] - velocity[:-width])
+    left, turns = np.abs(moved - by), change >= 0.5 * np.max(change)
+    lag = SHAFT.longest_effort_lag  # or what is much more than usual
+    if np.any(change):
+        lag = min(lag, STREAM.zero * float(np.median(left[turns]) / np.median(change[turns])))
     usual = STREAM.zero * np.median(left[far >= np.median(far)])
     excess = left - np.minimum(SHAFT.agree * far, np.maximum(SHAFT.late * far, usual))
     noise = piece.noise["position"] + piece.noise["velocity"] * period * math.sqrt(width)
-    allowed = SHAFT.joint_rest * SHAFT.way + max(SHAFT.longest_effort_lag, period) * np.abs(change)
+    allowed = SHAFT.joint_rest * SHAFT.way + max(lag, period) * change
     excess -= allowed + SHAFT.noisy * noise
     if 2 * np.sum(excess > 0.0) < width:
         return ""
