@@ -1,5 +1,6 @@
 """What the driver watches: each quantity, its limit, and the warning near it."""
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -71,22 +72,17 @@ class LimitWatch:
             *((f"current of {name}", "A") for name in motors.names),
             *self._of_cables,
         ]
-        self._allowed = [self._half, self._half]  # how far below and above the middle each joint may be, rad
+        self._beyond = [0.0] * len(joints.names)  # rad from the middle, up to which each joint may be beyond a stop
 
     def begin(self, theta: Sequence[float]) -> None:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""
-        self._allowed = [
-            [most if most > half + DRIVER.leeway else half for most, half in zip(side, self._half, strict=True)]
-            for side in self._leeways(self._map.joint_positions(theta))
+        self._beyond = [
+            off + math.copysign(DRIVER.leeway, off) if abs(off) > half else 0.0
+            for off, half in zip(self._off(self._map.joint_positions(theta)), self._half, strict=True)
         ]
 
-    def _leeways(self, q: Sequence[float]) -> list[list[float]]:
-        """How far below and above the middle is a leeway beyond each joint, and not before its stop."""
-        off = [angle - middle for angle, middle in zip(q, self._middle, strict=True)]
-        return [
-            [max(half, side * at + DRIVER.leeway) for at, half in zip(off, self._half, strict=True)]
-            for side in (-1.0, 1.0)
-        ]
+    def _off(self, q: Sequence[float]) -> list[float]:
+        return [angle - middle for angle, middle in zip(q, self._middle, strict=True)]
 
     def obstacle(self, theta: Sequence[float]) -> str:
         """Why an arm at the motor angles theta, (n,), rad, may not be enabled: no joint is so far beyond a stop."""
@@ -112,15 +108,19 @@ class LimitWatch:
         tensions : largest of each cable since the last check, N, (n,).
         """
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        # what was allowed beyond a stop is taken back as the joint returns
-        self._allowed = [list(map(min, *both)) for both in zip(self._allowed, self._leeways(q), strict=True)]
-        sides = zip(*self._allowed, q, self._middle, strict=True)
-        travel = [above if angle > middle else below for below, above, angle, middle in sides]
+        off, travel = self._off(q), self._half
+        if any(self._beyond):  # what was allowed is taken back as the joint returns
+            self._beyond = [
+                math.copysign(min(abs(most), max(at * math.copysign(1.0, most) + DRIVER.leeway, 0.0)), most)
+                for most, at in zip(self._beyond, off, strict=True)
+            ]
+            each = zip(self._beyond, off, self._half, strict=True)
+            travel = [max(half, abs(most)) if most * at > 0.0 else half for most, at, half in each]
         limits = [*self._speeds, *travel, *self._arm.motors.peak_current, *self._strengths]
         values = [
             *self._body.start_and_tool_speeds(q, qd),
             *map(abs, qd),
-            *[abs(angle - middle) for angle, middle in zip(q, self._middle, strict=True)],
+            *map(abs, off),
             *map(abs, currents),
             *tensions,
         ]

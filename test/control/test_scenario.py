@@ -111,13 +111,15 @@ def test_a_force_rises_from_that_of_the_step_before_in_its_own_frame() -> None:
         ScenarioStep("turned", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 6.0), (0.0, -1.8, 0.0)), rise=0.1),
         ScenarioStep("anywhere", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 4.0)), rise=0.1),
         ScenarioStep("there", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 2.0), (0.0, -0.4, 0.0)), rise=0.1),
+        ScenarioStep("off", 0.1, force=ForceCommand("outer_link", (0.0, 0.0, 0.0)), rise=0.1),
     ]
-    found = [out.force for out in play(Scenario(steps), 120)]
+    found = [out.force for out in play(Scenario(steps), 140)]
     assert [force.force[2] for force in found[:40:10]] == pytest.approx([0.0, -2.0, -4.0, -8.0])
     assert found[50].force == pytest.approx((0.0, 3.0, 0.0))
     assert found[50].torque == pytest.approx((0.0, 0.0, 0.6))
     assert found[70][1:] == (pytest.approx((0.0, 3.0, 3.0)), pytest.approx((0.0, -0.75, 0.75))), "halfway between both"
     assert [pinned_position(force) for force in found[81:120:18]] == [None, None, ("outer_link", pytest.approx(0.2))]
+    assert pinned_position(found[130]) == ("outer_link", pytest.approx(0.2)), "its own to the end"
     swept = Scenario([steps[0]._replace(seconds=1.0, chirp=Chirp(4.0, 2.0, 3.0))])
     assert np.abs(np.diff([out.force.force[2] for out in play(swept, 199)])).max() < 0.6, "a chirp rises with its force"
     early = Scenario([steps[0]._replace(until_force=1.0), *steps[1:]])

@@ -118,6 +118,8 @@ def test_an_arm_that_a_dither_shakes_is_at_rest() -> None:
     player = TrajectoryPlayer(replace(SHARED, timing=replace(SHARED.timing, dither_cycle=40)))
     found = [player.step(PATH, START, [0.0, 0.2 * (-1) ** k, 0.0, 0.0], PERIOD) for k in range(8)]
     assert [one is not None for one in found] == [False] * 7 + [True], "after a whole cycle"
+    others = [PosturePath((PathPoint(GOAL, (), 1.0 + k // 3),)) for k in range(9)]
+    assert all(player.step(other, START, [0.0, 0.2 * (-1) ** k, 0.0, 0.0], PERIOD) for k, other in enumerate(others))
 
 
 def test_a_streamed_trajectory_begins_as_the_brakes_are_released() -> None:

@@ -465,11 +465,14 @@ def test_a_lost_wake_up_is_repeated() -> None:
     assert rig.start()[-1] is Wait.HOME
 
 
-def test_a_zero_that_a_jump_has_lost_is_set_again_also_by_the_next_driver() -> None:
+@pytest.mark.parametrize(("is_idle", "seconds"), [(False, 0.05), (True, 0.5)])
+def test_a_zero_that_a_jump_has_lost_is_set_again_also_by_the_next_driver(is_idle: bool, seconds: float) -> None:
     rig = Rig()
     rig.enable()
-    rig.bus.controllers[1].values["P"] += 20 * 4096
-    rig.run(0.05)
+    rig.bus.switch(SafetyMode.IDLE if is_idle else SafetyMode.ACTIVE)
+    rig.run(0.06)
+    rig.bus.controllers[1].values["P"] += 2 * 4096
+    rig.run(seconds)
     rig.arm.clear()
     for _ in range(2):
         assert rig.start(2.0)[-1] is Wait.HOME

@@ -33,17 +33,9 @@ from wam_ros.network import occupant
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = (
-    "LICENSE",
-    "package.xml",
-    "pyproject.toml",
-    "setup.cfg",
-    "setup.py",
-    "config",
-    "launch",
-    "rviz",
-    "resource",
+    "LICENSE", "package.xml", "pyproject.toml", "setup.cfg", "setup.py", "config", "launch", "rviz", "resource",
     "scripts",
-)
+)  # fmt: skip
 NODES = tuple(TABLE)
 PATHS = ("PATH", "PYTHONPATH", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH")
 

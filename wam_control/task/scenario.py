@@ -286,11 +286,11 @@ class Scenario:
 def _between(before: ForceCommand, force: ForceCommand, share: float) -> ForceCommand:
     """A share of the way from one force to another, and from one place to another; in another frame the first is none.
 
-    Where only one has a place, that of the new one counts, or none.
+    Where only one has a place, that of the new one counts, or none; a force that ends keeps its own.
     """
     start = before if before.frame == force.frame else NO_FORCE
     x, y, z = (a + share * (b - a) for a, b in zip(start.force, force.force, strict=True))
-    pinned = pinned_position(force)
+    pinned = pinned_position(force) or (None if any(force.force) else pinned_position(start))
     if pinned is None:
         return force._replace(force=(x, y, z))
     goal = pinned[1]

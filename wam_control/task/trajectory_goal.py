@@ -60,8 +60,7 @@ class TrajectoryPlayer:
     def __init__(self, shared: Shared) -> None:
         self._arm, self._limits, timing = shared.arm, shared.motion, shared.timing
         # a dither shakes the joints: they rest where their mean over a cycle does
-        cycle = math.ceil(timing.dither_cycle / timing.outer_divisor)
-        self._velocities = deque[Sequence[float]](maxlen=max(cycle, 1))
+        self._velocities = deque[Sequence[float]](maxlen=math.ceil(timing.dither_cycle / timing.outer_divisor) or 1)
         self._waited = 0.0
         self.trajectory: PosturePath | None = None
         self.motion: PostureMotion | None = None
@@ -76,14 +75,14 @@ class TrajectoryPlayer:
         q, qd : joint angles and velocities (n,), rad and rad/s.
         dt : outer period, s.
         """
-        if trajectory != self.trajectory:
-            self.trajectory, self.motion, self.time, self.refusal = trajectory, None, 0.0, ""
-            self._waited = 0.0
+        if self.trajectory is None:
             self._velocities.clear()
+        self._velocities.append(qd)
+        if trajectory != self.trajectory:
+            self.trajectory, self.motion, self.time, self.refusal, self._waited = trajectory, None, 0.0, "", 0.0
         if trajectory is None or (self.refusal and not self._waited):
             return None
         if self.motion is None:
-            self._velocities.append(qd)
             if len(self._velocities) != self._velocities.maxlen:
                 return None
             speed = max(abs(fmean(each)) for each in zip(*self._velocities, strict=True))

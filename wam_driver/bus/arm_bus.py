@@ -48,7 +48,8 @@ class ArmBus:
 
     def clear(self) -> None:
         """Forget a fault; the start-up is repeated where controllers or their zero may be lost."""
-        if self.trouble and BusFault(str(self.trouble.cause)).loses_controllers:
+        is_zero_lost = self._cycle is not None and self._cycle.is_zero_lost
+        if is_zero_lost or (self.trouble and BusFault(str(self.trouble.cause)).loses_controllers):
             self.begin()
         self._host.trouble = None
 

@@ -158,10 +158,10 @@ class Cycle:
         self.is_zero_lost |= any(motor.has_jumped for motor in silent)
         if self._host.trouble:
             return
+        node, refused = silent[0].node, self._host.refused
         self.stop()  # first: to find out why takes some periods
-        node = silent[0].node
-        if self._host.refused:
-            self._fault(BusFault.NOT_SENT, 0, self._host.refused)
+        if refused:
+            self._fault(BusFault.NOT_SENT, 0, refused)
         elif len(silent) == len(self.motors):
             fault = self._host.silence(BusFault.ALL_SILENT)
             self._pendant = (fault == BusFault.ESTOP and self._host.ask(SAFETY, "PEN", 1)) or self._pendant
