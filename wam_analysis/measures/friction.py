@@ -155,13 +155,14 @@ def _in_motion(
     rows = np.flatnonzero(onward | back)
     if len(rows) < SHAFT.fewest_samples or 0.0 < min(ways) < SHAFT.both_ways * max(ways):
         return nothing
-    v, wanted, *others = (np.convolve(each, triangle, "same")[rows] for each in (velocity, torque, *load.T, *waves.T))
+    smooth = [np.convolve(each, triangle, "same") for each in (velocity, torque, *load.T, *waves.T)]
+    v, wanted, *others = (each[rows] for each in smooth)
     acceleration = np.convolve(velocity, slope, "same")[rows] / period
     direction, number = np.where(onward[rows], 1.0, -1.0), load.shape[1]
     columns = np.column_stack([direction, v, acceleration, np.ones(len(rows)), *others[:number]])
     disturbances = np.column_stack([np.empty((len(rows), 0)), *others[number:]])
     solution, errors, residual = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
-    once = np.convolve(torque, triangle, "same")
+    once = smooth[1]
     curved = np.convolve(once, triangle, "same") - once  # what an average leaves out of a smooth motion, too
     inner = rows[np.isin(rows - half, rows) & np.isin(rows + half, rows)]
     inner, part = (inner, 1.0) if len(inner) >= SHAFT.fewest_samples else (rows, 0.0)
