@@ -83,6 +83,8 @@ def test_a_cycle_wider_than_the_band_does_not_settle_wherever_the_recording_stop
     assert step_response(time, cycle - np.exp(-30.0 * time), 0.0, 1.0, 0.02).settling == math.inf
     fast = 1.0 + np.sin(2.0 * math.pi * time / 0.00525 + phase)  # of few samples in a period, which are no noise
     assert force_response(time, fast, 0.0, 1.0, 1.0)[1].verdict is Verdict.LIMIT_CYCLE
+    few = 0.2 * np.sin(0.5 * math.pi * np.arange(4000) + phase)  # all of four samples may miss the peak
+    assert limit_cycle(time / 0.2, few).peak_to_peak == near(0.4)
 
 
 def test_the_three_strongest_lines_are_listed_beside_a_much_larger_motion():
@@ -257,6 +259,9 @@ def test_slow_samples_show_the_inertia_and_a_friction_that_changed_its_mean(late
     assert found.inertia.value == PRECISE(0.2, rel=0.002 if later == 1.0 else 0.1)
     assert abs(found.dynamic.value - 0.5 * (1.0 + later)) < 3.0 * found.dynamic.error
     assert found.unexplained > 0.1 * (later - 1.0)
+    fast = np.cos(2.0 * np.pi * time[:600] / 2.0)
+    smooth = identify_friction(time[:600], fast, 3.0 * fast + np.sign(fast), rest=0.002, window=0.3)
+    assert smooth.unexplained < 0.01  # an average leaves out more of a smooth motion
 
 
 def response(
