@@ -41,20 +41,20 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[Spect
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     sure = math.log(n / 2) + CYCLE.sure_line
     found: list[SpectralLine] = []
-    groups: list[int] = []
-
-    def strongest(row: int) -> int:
-        return row // CYCLE.apart + int(np.argmax(power[row // CYCLE.apart : row * CYCLE.apart]))
-
+    # peaks in the order of power; the strongest one near each line; lines that are the strongest near themselves
+    seen, groups, heads = list[int](), list[int](), set[int]()
     free = np.ones(len(power), np.bool_)  # of stronger lines, whose power is no noise
     for k in peaks[np.argsort(-power[peaks])].tolist():
         is_clear = not found or (len(found) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * found[0].amplitude)
-        is_drift, near = k < CYCLE.episode_cycles, strongest(k)
+        is_drift = k < CYCLE.episode_cycles
+        seen.append(k)
+        near = next(one for one in seen if k // CYCLE.apart <= one < k * CYCLE.apart)
         is_near = groups.count(near) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * amplitude[near]
-        if not (is_drift or is_clear or (is_near and strongest(near) == near)):
+        if not (is_drift or is_clear or near == k or (is_near and near in heads)):
             continue
         if power[k] < sure * max(_nearest(levels, free, k), _noise(levels, free, k)):
             continue
+        heads |= {k} & {near}
         free[max(k - CYCLE.lobe, 0) : k + CYCLE.lobe + 1] = False
         if is_drift:
             continue
