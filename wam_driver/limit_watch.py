@@ -72,7 +72,12 @@ class LimitWatch:
             *((f"current of {name}", "A") for name in motors.names),
             *self._of_cables,
         ]
+        self._limits = self._with_travel(self._half)
         self._beyond = [0.0] * len(joints.names)  # rad from the middle, up to which each joint may be beyond a stop
+
+    def _with_travel(self, travel: Sequence[float]) -> list[float]:
+        """The limits of all quantities, with those of the travel, (n,), rad."""
+        return [*self._speeds, *travel, *self._arm.motors.peak_current, *self._strengths]
 
     def begin(self, theta: Sequence[float]) -> None:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""
@@ -108,15 +113,14 @@ class LimitWatch:
         tensions : largest of each cable since the last check, N, (n,).
         """
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        off, travel = self._off(q), self._half
+        off, limits = self._off(q), self._limits
         if any(self._beyond):  # what was allowed is taken back as the joint returns
             self._beyond = [
                 math.copysign(min(abs(most), max(at * math.copysign(1.0, most) + DRIVER.leeway, 0.0)), most)
                 for most, at in zip(self._beyond, off, strict=True)
             ]
             each = zip(self._beyond, off, self._half, strict=True)
-            travel = [max(half, abs(most)) if most * at > 0.0 else half for most, at, half in each]
-        limits = [*self._speeds, *travel, *self._arm.motors.peak_current, *self._strengths]
+            limits = self._with_travel([max(half, abs(most)) if most * at > 0.0 else half for most, at, half in each])
         values = [
             *self._body.start_and_tool_speeds(q, qd),
             *map(abs, qd),
