@@ -141,7 +141,7 @@ class Reaction(NamedTuple):
 
 
 class Call(NamedTuple):
-    """A request to a service of another node; `data` is None for a std_srvs/Trigger."""
+    """A request to a service of another node, '' where its name has none; `data` is None for a std_srvs/Trigger."""
 
     node: str
     service: str

@@ -25,9 +25,10 @@ def service_request(request: Request) -> tuple[str, Any, Any]:
         sent = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
         message = SetParametersService.Request(parameters=sent)
         return f"{request.node}/set_parameters", SetParametersService, message
+    name = f"{request.node}/{request.service}".lstrip("/")
     if request.data is None:
-        return f"{request.node}/{request.service}", Trigger, Trigger.Request()
-    return f"{request.node}/{request.service}", SetBool, SetBool.Request(data=request.data)
+        return name, Trigger, Trigger.Request()
+    return name, SetBool, SetBool.Request(data=request.data)
 
 
 def answer_of(request: Request, response: Any) -> Answer:

@@ -18,7 +18,6 @@ from typing import Any, Final
 import yaml
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from std_srvs.srv import SetBool, Trigger
 
 from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
@@ -29,6 +28,7 @@ from wam_description.parameters import ParameterError, dotted, meant, require
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
 from wam_description.status import REFUSED
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH, Topic
+from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
 from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
@@ -353,15 +353,16 @@ class RunningArm:
             where there is no such service, with a switch or without.
         """
         self._require_start()
-        kinds = {"std_srvs/srv/Trigger": Trigger, "std_srvs/srv/SetBool": SetBool}
+        kinds = {"std_srvs/srv/Trigger": "no value", "std_srvs/srv/SetBool": "True or False"}
         found = self.node.get_service_names_and_types()
         there = {name.removeprefix(f"/{NAMESPACE}/"): kinds[kind] for name, (kind, *_) in found if kind in kinds}
         require(service in there, f"no service is named '{service}'; there are {', '.join(there)}")
-        client, is_trigger = self._client.client(there[service], service), there[service] is Trigger
-        fits = switch is None if is_trigger else isinstance(switch, bool)
-        require(fits, f"'{service}' takes {'no value' if is_trigger else 'True or False'}")
+        fits = switch is None if there[service] == "no value" else isinstance(switch, bool)
+        require(fits, f"'{service}' takes {there[service]}")
+        node, _, name = service.rpartition("/")
+        client, message = self._client.service(Call(node, name, switch))
         self.run_until(client.service_is_ready)
-        future = client.call_async(Trigger.Request() if is_trigger else SetBool.Request(data=switch))
+        future = client.call_async(message)
         self._spin(future.done, TEST_LIMITS.arm_time, lambda: None)  # a fault that it causes is no failure of the call
         return future.result()
 
