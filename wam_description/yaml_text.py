@@ -3,7 +3,7 @@
 import re
 from collections.abc import Hashable, Mapping
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import Any, ClassVar, Final, TextIO
 
 import yaml
 
@@ -23,6 +23,12 @@ def _refusal(reason: str, at: Any) -> yaml.YAMLError:
 
 
 class _Strict(_LOADER):
+    # on, off, yes and no are texts, as in YAML 1.2
+    yaml_implicit_resolvers: ClassVar = {
+        first: [one for one in found if first in "tTfF" or not one[0].endswith(":bool")]
+        for first, found in _LOADER.yaml_implicit_resolvers.items()
+    }
+
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
