@@ -38,7 +38,7 @@ class Mistake(StrEnum):
     )
     # the torques of a motor are not those of any arm
     UNEXPLAINED = (
-        "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm, is its base tilted, "
+        "{share} of the friction of {about} remains unexplained: did something touch the arm, is its base tilted, "
         "are torques late or cut off, or angles in another unit?"
     )
     WEIGHT = (
@@ -57,7 +57,8 @@ class Contradiction(NamedTuple):
 
     def __str__(self) -> str:
         """The contradiction and its likely cause in words."""
-        return self.mistake.format(about=" and ".join(self.about), size=self.size)
+        share = f"{self.size:.0%}" if self.size <= 1.0 else "more than all"
+        return self.mistake.format(about=" and ".join(self.about), size=self.size, share=share)
 
 
 def contradictions(shared: Shared, motion: MotionSamples, found: Identification) -> list[Contradiction]:
