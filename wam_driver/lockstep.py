@@ -12,12 +12,12 @@ from wam_driver.session import Session
 from wam_driver.thresholds import DRIVER
 
 
-def unpublished(found: Mapping[str, Sequence[str]]) -> str:
+def unpublished(found: Mapping[str, Sequence[str]], instead: str = "") -> str:
     """What to do about nodes that run and do not answer, each with the topics that it did not publish."""
     node, topics = next(iter(found.items()))
     which = " and ".join(topics)
     if not node:
-        return f"list a node in 'nodes' that publishes {which}"
+        return f"list a node in 'nodes' that publishes {which}{instead}"
     return f"{node} runs, but did not publish {which}: its step has to return this each time"
 
 
@@ -145,7 +145,7 @@ class Lockstep:
         if unknown or not found:
             senders = unknown or [self._senders[topic] for topic in missing]
             return f"check that {' and '.join(senders)} run{'s' * (len(senders) == 1)}"
-        return unpublished(found)
+        return unpublished(found, ", or start yours, then call reset_fault")
 
     @property
     def start_overdue(self) -> bool:

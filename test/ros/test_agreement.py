@@ -61,11 +61,9 @@ def test_every_other_shared_parameter_is_compared() -> None:
     assert len(OWN) == 3 * (1 + len(compared))
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["?", OWN[:-3], OWN + "abc", "AAA" + OWN[3:], "\x00" * len(OWN), "é" * 100_000],
-    ids=["short", "fewer", "more", "other names", "zeros", "long"],
-)
+@pytest.mark.parametrize("text", [
+    "?", OWN[:-3], OWN + "abc", "AAA" + OWN[3:], "\x00" * len(OWN), "é" * 100_000,
+], ids=["short", "fewer", "more", "other names", "zeros", "long"])  # fmt: skip
 def test_digests_of_other_parameters_are_those_of_another_version(text: str) -> None:
     assert "gravity was started with another version" in disagreement("gravity", OWN, text)
 
@@ -128,7 +126,7 @@ RESTARTS = {
     "a driver without the node": ([("gravity", HEAVY), ("gravity", NO), ("driver", {})], "not connected yet: gravity"),
     "a driver that does not list the node": (
         [("gravity", HEAVY), ("gravity", NO), ("driver", FEWER)],
-        "list a node in 'nodes' that publishes gravity_effort",
+        "list a node in 'nodes' that publishes gravity_effort, or start yours, then call reset_fault",
     ),
     "a node that differs and is not listed": ([("driver", FEWER), ("gravity", HEAVY)], f"{GRAVITY}arm.payload than"),
 }  # fmt: skip
