@@ -62,9 +62,10 @@ class LoopDesign(NamedTuple):
                 f"undecided: up to {undecided:.4g} all responses that were followed to their end come to rest, but "
                 f"some were not followed to their end ({DESIGN.patient_events} events)"
             )
-        if verdict.saturated_cycle and not verdict.stable_error:
-            lines.append(f"a large step may end in another limit cycle, peak to peak: {followed}")
         lower = f"lower the gain to {rounded_down(DESIGN.close * verdict.margin):g}, {DESIGN.close:g} of the largest"
+        if verdict.saturated_cycle and not verdict.stable_error:
+            lines.append(f"friction keeps up a limit cycle, peak to peak: {followed}")
+            lower = "lower the gain or the delay"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)
             saturate = f", or saturate the error at {error:g}" if error else ""
@@ -76,7 +77,7 @@ class LoopDesign(NamedTuple):
 
 
 MEANING = {
-    Domain.I: "stable for every error",
+    Domain.I: "without friction stable for every error",
     Domain.II: "friction stabilises it for small errors",
     Domain.BEYOND: "undecided: no error was shown to be safe, and not all were shown to be unsafe",
     Domain.III: "unstable: at every error that was tried, some response does not come to rest",

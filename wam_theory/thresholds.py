@@ -42,7 +42,7 @@ class DesignThresholds:
     patient_events: int = 40_000  # the same for a loop that is designed: there is time
     # rad of the node's own frequency per sample: a faster loop without delay is examined as a continuous one
     continuous: float = 0.1
-    cycle_excess: float = 1.5  # largest cycle that counts as the stiction cycle, in sizes of (5.8)
+    cycle_excess: float = 2.0  # largest cycle that counts as the stiction cycle, in sizes of (5.8); a delay enlarges it
 
 
 SEARCH, DESIGN = SearchThresholds(), DesignThresholds()

@@ -23,6 +23,7 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_studies.guard_validation import DIVERGES, GuardStudy, validate
 from wam_theory.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
+from wam_theory.loop_design import LoopDesign
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
@@ -70,6 +71,7 @@ def test_in_domain_i_a_cycle_above_the_saturation_is_not_safe() -> None:
     near = friction_verdict(node, replace(loop, gain=0.98052509 * margin))
     assert near.domain is Domain.I
     assert near.saturated_cycle == pytest.approx(2.1 * loop.error_limit, rel=0.05)
+    assert "\nnot safe: lower the gain or the delay" in LoopDesign(node, loop, 0.0, 0.0, near).text()
     far = friction_verdict(node, replace(loop, gain=0.5 * margin))
     assert (near.stable_error, far.stable_error, far.saturated_cycle) == (0.0, math.inf, 0.0)
 
