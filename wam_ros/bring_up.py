@@ -226,24 +226,27 @@ class Composition(Connection):
 
     Parameters
     ----------
-    configuration : values for all nodes; its `shared.nodes` names which ones are made.
-    namespace : namespace of the nodes.
+    configuration : as for `compose`; None makes no node yet.
+    namespace, is_split : as for `make`.
     domain_id : ROS domain, the one of the environment where None.
-    is_split : as for `Connection.make`.
     """
 
     def __init__(
         self,
-        configuration: Configuration,
+        configuration: Configuration | None = None,
         namespace: str = NAMESPACE,
         domain_id: int | None = None,
         is_split: bool = False,
     ) -> None:
+        super().__init__(domain_id=domain_id)
+        if configuration:
+            self.compose(configuration, namespace, is_split)
+
+    def compose(self, configuration: Configuration, namespace: str = NAMESPACE, is_split: bool = False) -> None:
+        """Make the nodes of a configuration, those that its `shared.nodes` names, with its values."""
         with parameter_file(configuration) as file:
             own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
-            makers = node_makers(configuration.shared.nodes, **own)
-            super().__init__(domain_id=domain_id)
-            self.make(makers, namespace, is_split)
+            self.make(node_makers(configuration.shared.nodes, **own), namespace, is_split)
 
     def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> str:
         """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it.

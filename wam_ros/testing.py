@@ -138,16 +138,19 @@ class RunningArm:
         ParameterError
             where a value is refused, or there is no such node.
         """
-        assert self._composition is None, "the stack of this test already runs; call start once, before all else"
+        assert not self._is_started, "the stack of this test already runs; call start once, before all else"
+        self._has_ended = False
         self.configuration = configured(*own, configuration=configuration, nodes=nodes, **values)
         self.interface = Interface(self.configuration.shared)
         self._is_lockstep = self.configuration.shared.timing.mode == "lockstep"
         require_parameters(self.configuration)
-        self._composition = Composition(self.configuration, domain_id=self._domain_id)
-        self.nodes: dict[str, Any] = self._composition.nodes
-        self.executor = self._composition.executor
+        made, self._composition = self._connected(), None  # one whose nodes cannot be made is closed
+        made.compose(self.configuration)
+        self._composition = made
+        self.nodes: dict[str, Any] = made.nodes
+        self.executor = made.executor
         self._driver: Any = self.nodes["driver"].driver if "driver" in self.nodes else None
-        self._client = StackClient(NAMESPACE, "test", self._composition, self.configuration.shared)
+        self._client = StackClient(NAMESPACE, "test", made, self.configuration.shared)
         self._client.follow_statuses()
         self.node = self._client.node
         self._streams: dict[str, tuple[int, Any]] = {}  # until a stamp, ns: a value
@@ -182,8 +185,8 @@ class RunningArm:
 
     @property
     def context(self) -> Any:
-        """The rclpy context of the stack: a node for `add` is made with it."""
-        return self._require_start().context
+        """The rclpy context of the stack, also before its start: a node for `add` is made with it."""
+        return self._connected().context
 
     # what the arm does
 
@@ -236,7 +239,7 @@ class RunningArm:
     def add(self, node: Any) -> Any:
         """Spin a plain rclpy node, too.  Make it with ``context=arm.context``; it ends with the test."""
         require(isinstance(node, Node), f"{node!r} is no node of rclpy; give one, made with context=arm.context")
-        return self._require_start().add(node)
+        return self._connected().add(node)
 
     def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
         """Spin until a condition holds; it is checked once per outer period of the arm.
@@ -466,7 +469,7 @@ class RunningArm:
         ArmFault
             where the scenario failed.
         """
-        if self._composition is None:
+        if not self._is_started:
             self.start(configuration=playing(steps, self._folder, **start))
         elif steps or start or "scenario" not in self.configuration.shared.nodes:
             raise ValueError("the arm has been started already; call play instead of start, with its arguments")
@@ -483,12 +486,21 @@ class RunningArm:
             self._composition.close()
             self._composition, self._has_ended = None, True
 
-    def _require_start(self) -> Composition:
+    def _connected(self) -> Composition:
         if self._composition is None:
             assert not self._has_ended, "the stack of this test has ended; read the bag that play returned"
-            self.start()
-        assert self._composition is not None
+            self._composition = Composition(domain_id=self._domain_id)
         return self._composition
+
+    @property
+    def _is_started(self) -> bool:
+        return self._composition is not None and bool(self._composition.nodes)
+
+    def _require_start(self) -> Composition:
+        if not self._is_started:
+            self._connected()
+            self.start()
+        return self._connected()
 
 
 def _source(condition: Callable[[], Any]) -> str:

@@ -182,7 +182,8 @@ def test_a_posture_without_a_stamp_counts_as_now_and_the_status_says_so(arm: Run
 def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
     from rclpy.node import Node
 
-    node, heard = Node("mine", namespace="wam", context=arm.start(nodes=INNER).context), []
+    node, heard = Node("mine", namespace="wam", context=arm.context), []
+    arm.start(nodes=INNER)
     written = arm.nodes["transform"].outlets.written
     arm.run(0.1)
     assert written["joint_states"] == 0  # the nodes of the process hand it to each other
@@ -287,7 +288,7 @@ def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text:
 def test_a_stack_that_has_ended_has_no_truth_and_is_not_started_again(arm: RunningArm) -> None:
     with pytest.raises(ParameterError, match="is no node; give its class"):
         arm.start(object())
-    assert arm.context.ok()  # asking for it starts the stack
+    assert arm.context.ok()  # also before the start
     arm.close()
     with pytest.raises(AssertionError, match="has ended; read the bag"):
         _ = arm.truth
