@@ -9,6 +9,7 @@ from multiprocessing import get_context
 from wam_cli.options import COUNT, bounded, configuration_of, take_configuration, take_stack
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
+from wam_description.parts import Motors
 from wam_driver.bus.bus_parameters import BusParameters
 from wam_driver.bus.dry_run import heard, sent
 from wam_driver.bus.line import answer, line_of
@@ -19,6 +20,7 @@ from wam_ros.conformance import NOT_TESTED, OK, WRONG, conformance_rows
 from wam_ros.driver_bench import DriverBench
 from wam_ros.network import occupant, requested_domain, require_places
 from wam_ros.priority import set_priority
+from wam_theory.rounding import rounded_down
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,6 +92,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = driver_alone(on_bus(configuration, given.bus))
     if given.dry_run:
         return _listen(configuration, given.dry_run)
+    _require_rated(given.current, configuration.shared.arm.motors)
     entry = configuration.shared.nodes[0]
     values = *given.values, "timing.mode=realtime", f"nodes=[{entry},velocity_loop]"
     words = ["--config", given.config, *(f"--set={value}" for value in values), "-r", f"__ns:=/{given.namespace}"]
@@ -128,6 +131,12 @@ def run(given: argparse.Namespace) -> int:
             print(row.text, flush=True)
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return int(counts[WRONG] > 0)
+
+
+def _require_rated(current: float, motors: Motors) -> None:
+    name, rated = motors.names[0], rounded_down(motors.continuous_torque[0] / motors.torque_constant[0])
+    if current > rated:
+        raise ValueError(f"--current is {current:g} A; allowed: 0 to {rated:g} A, the rated current of {name}")
 
 
 def _serve(configuration: Configuration, version: int) -> None:
