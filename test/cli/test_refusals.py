@@ -7,12 +7,16 @@ import pytest
 
 from wam_cli.main import main
 
+SAMPLES = Path(__file__).resolve().parents[2] / "bags" / "sample"
 OWN = "steps:\n  - {name: release, seconds: 0.1, request: enable}\n"
 
 # words and reason; own.yaml is a file of the user, `file` one in the way, `none` does not exist
 REFUSED = [
     ("guard --contact 0", "argument --contact: '0' is not allowed; give a number of at least 1e-12"),
     ("conform --config barrett-wam4-bus --current 50", "--current is 50 A; allowed: 0 to 3.26 A, the rated current of"),
+    (f"experiment wam-press --evaluate {SAMPLES}/wam-slide", "wam-slide is no recording of run 'press' of wam-press"),
+    (f"experiment wam-touch --evaluate {SAMPLES}/actuator-limit-cycle", "its scenario is bags/recorded/actuator-lim"),
+    (f"experiment quantised-force --evaluate {SAMPLES}/stiction-limit-cycle", ", different: "),
     ("evaluate guard --cases -3", "argument --cases: '-3' is not allowed; give a whole number of at least 1"),
     ("evaluate contact --jobs 0", "argument --jobs: '0' is not allowed; give a whole number from 1 to 1024"),
     ("evaluate contact --free nan", "argument --free: 'nan' is not allowed; give a number from 0 to 1e+09"),

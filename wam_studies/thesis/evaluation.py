@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wam_bag.bag import BagError
 from wam_bag.losses import CUT
+from wam_description.configuration import shaped_like
 from wam_description.event import Code
 from wam_description.parameters import ParameterError
 from wam_studies.thesis.definition import Experiment, Run
@@ -27,7 +28,7 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
     Raises
     ------
     BagError
-        if a bag is missing or cannot be read, or a run was not played to its end.
+        if a bag is missing, cannot be read or is of another run, or a run was not played to its end.
     """
     if (directory / "metadata.yaml").is_file() and CUT in (recorded := recording(directory)).bag.metadata:
         return evaluate_sample(experiment, recorded)
@@ -45,6 +46,7 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
 
 def _require_whole(experiment: Experiment, run: Run, recorded: Recording) -> None:
     """Refuse a run that was interrupted, unless the driver is expected to stop it."""
+    _require_own(experiment, run, recorded)
     names = [str(step["name"]) for step in run.steps]
     if (recorded.outcome == Code.DONE and len(recorded.steps) >= len(names)) or (run.stops and recorded.fault):
         return
@@ -58,6 +60,23 @@ def _require_whole(experiment: Experiment, run: Run, recorded: Recording) -> Non
         f"{recorded.bag.path}: run '{run.name}' ended in step '{step}', {finished} of {len(names)} steps "
         f"finished{because}; the evaluation needs all of them: repeat 'wam experiment {experiment.name}'"
     )
+
+
+def _require_own(experiment: Experiment, run: Run, recorded: Recording) -> None:
+    """Refuse the bag of another run: of another scenario, or with other values."""
+    nodes, steps = recorded.parameters.nodes, [str(step["name"]) for step in run.steps]
+    different = [step.name for step in recorded.steps if step.name not in steps]
+    for key, value in run.values.items():
+        node, _, name = key.rpartition(":")
+        present = nodes.get(node or "scenario", {}).get(name)
+        different += [key] * (name != "nodes" and present != shaped_like(present, value))
+    script = str(nodes.get("scenario", {}).get("script", "unknown"))
+    if different or not (recorded.steps or Path(script).stem == run.name):
+        found = ", different: ".join([f"its scenario is {script}", *different[:1]])
+        raise BagError(
+            f"{recorded.bag.path} is no recording of run '{run.name}' of {experiment.name}: {found}; "
+            f"give a bag of 'wam experiment {experiment.name}'"
+        )
 
 
 def evaluate_sample(experiment: Experiment, recorded: Recording) -> Result:
@@ -74,6 +93,7 @@ def evaluate_sample(experiment: Experiment, recorded: Recording) -> Result:
     """
     if experiment.sample is None:
         raise BagError(f"experiment {experiment.name} declares no sample; give the bags of its runs")
+    _require_own(experiment, experiment.run(experiment.sample.run), recorded)
     return _evaluate(experiment, {experiment.sample.run: recorded})
 
 
