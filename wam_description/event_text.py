@@ -161,7 +161,7 @@ LOADED: Final = "declare the load (arm.payload); if the tool carries none, "  # 
 TURNED: Final = "in the frame of a link the force turns with it"
 SINCE: Final = ("without reaching it", "since the force was last within its tolerance")
 REACH: Final = (
-    "hardly anything is touched; bring the arm to the surface first, or command more force",
+    "hardly anything is touched; bring the arm to the surface first, or command more force, towards it",
     "command a force that the arm can reach",
     f"the arm is pulled, or carries a load that is not in its model; {PARTS['resting'][1]}",
 )

@@ -46,7 +46,7 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
     (fault("bus_safety_idle", detail="velocity"), "the arm moved faster than the safety module allows"),
     (warning(Code.NOT_REACHED, "force_off", measured=-0.2, **OFF), "for 2 s; hardly anything is touched"),
     (warning(Code.NOT_REACHED, "force_off", measured=-5.6, **OFF), "for 2 s; the arm is pulled"),
-    (warning(Code.NOT_REACHED, "force_off", measured=-2.6, **OFF | {"desired": -5.0}), "for 2 s; hardly anything"),
+    (warning(Code.NOT_REACHED, "force_off", measured=-2.6, **OFF | {"desired": -5.0}), "more force, towards it"),
     (warning(Code.MODEL_OFF, "model_off", part="friction of motor1"), "if it lasts, run 'wam identify'"),
     (warning(Code.MODEL_OFF, "model_off", part="payload"), "(arm.payload); if the tool carries none, run"),
     (warning(Code.UNEXPLAINED, "torques_differ", **DIFFER, source="motors"), "position, use the dither (t"),
