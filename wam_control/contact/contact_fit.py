@@ -43,12 +43,12 @@ class Fit(NamedTuple):
     low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
     along : probability that the force is along the tube, of a contact on this link.
     force : (2,), N, most likely components across the link at `position`.
-    force_sd : N, standard deviation of the size of the force, the position unknown, and whether it is along the tube if
-        `along` is above 0.5.
+    force_sd : N, standard deviation of the size of the force, the position unknown.
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
     torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
-        and force; infinite where they do not determine it.
-    force_at_end : (2,), N, the force if the position were the end of the link, the longest lever.
+        and force; infinite where they do not determine it, as of a force along the tube.
+    smallest : (3,), N, across the link and along it: the force if the position were the end of the link, the longest
+        lever; that along the tube if `along` is above 0.5.
     residual : what the best contact does not explain, chi^2.
     """
 
@@ -62,7 +62,7 @@ class Fit(NamedTuple):
     force_sd: float
     direction_sd: float
     torque_position_sd: float
-    force_at_end: Pair
+    smallest: Triple
     residual: float
 
 
@@ -280,7 +280,8 @@ class ContactFit:
         """
         scale, precision, (_, end) = self._given.force_scale, self._precision, self._ends[-1]
         r, a1, a2, b1, b2, _, axial = gram
-        size = abs(r[AXIAL]) / (axial[AXIAL] + precision) + CONTACT.smallest_force
+        force = r[AXIAL] / (axial[AXIAL] + precision)
+        size = abs(force) + CONTACT.smallest_force
         rarity, inner = self._log_rarity(size), [[r[0], r[AXIAL]], [r[AXIAL], axial[AXIAL]]]
         found: list[Piece] = []
         left = math.inf
@@ -294,7 +295,7 @@ class ContactFit:
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
             found.append((value + frequency, x, width, len(self._ends) - 1, True))
             left = min(left, rr - ra * ra / (aa + precision))
-        return found, size, left
+        return found, force, left
 
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
         """What the pieces, the most probable first, are of each link, and the sum of their weights."""
@@ -323,9 +324,9 @@ class ContactFit:
 
     def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, axial: float, left: float) -> Fit:
         start, end = ends
-        is_along, rest = part.along > 0.5 * part.mass, part.mass - part.along
-        side = min(max((part.first - part.first_along) / max(rest, CONTACT.negligible), start), end)
-        place = min(max(part.first_along / part.along, start), end) if is_along else side
+        is_along = part.along > 0.5 * part.mass
+        side = (part.first - part.first_along) / max(part.mass - part.along, CONTACT.negligible)
+        place = min(max(part.first_along / part.along if is_along else side, start), end)
         variance = max(0.0, (part.second - 2.0 * place * part.first) / part.mass + place * place)
         explained, force, (s11, s12, s22) = link.force(place)
         step = 0.5 * (end - start) / self._given.positions
@@ -335,9 +336,6 @@ class ContactFit:
         u1, u2 = force[0] / size, force[1] / size
         s11, s12, s22 = s11 + d1 * d1 * variance, s12 + d1 * d2 * variance, s22 + d2 * d2 * variance
         radial = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22
-        if is_along:  # or it is across, elsewhere: the force that is likeliest here is neither
-            across = math.hypot(*link.force(side)[1])
-            radial += (part.along * (axial - size) ** 2 + rest * (across - size) ** 2) / part.mass
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22
         return Fit(
             probability=part.mass / total,
@@ -348,9 +346,9 @@ class ContactFit:
             along=part.along / part.mass,
             force=force,
             force_sd=math.sqrt(radial),
-            direction_sd=min(math.sqrt(about) / size, math.pi),
-            torque_position_sd=link.torque_position_sd(place, force),
-            force_at_end=link.force(end)[1],
+            direction_sd=math.pi if is_along else min(math.sqrt(about) / size, math.pi),
+            torque_position_sd=math.inf if is_along else link.torque_position_sd(place, force),
+            smallest=(0.0, 0.0, axial) if is_along else (*link.force(end)[1], 0.0),
             residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
 

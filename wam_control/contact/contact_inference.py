@@ -36,7 +36,7 @@ class Hypothesis(NamedTuple):
     low, high : m, ends of the part of the cover that is in the 90 % set of positions on all covers; NaN
         where no part is.
     force : (3,), N, of the world on the link, in the cover's frame; where the position is NaN the
-        smallest force that explains the torques, that at the far end of the link.
+        smallest force that explains the torques, that at the far end of the link or along it.
     force_sd : N, standard deviation of its size; NaN where it is a lower bound.
     is_lower_bound : True where `force` is that smallest force.
     direction : rad, angle of the force about the link, from the cover's y to its z axis.
@@ -72,7 +72,7 @@ class _Cover(NamedTuple):
     start: list[float]  # (3,), m, ends of the tube's axis in the cover's frame
     end: list[float]
     wrenches: Array  # (6, 6), rows A_1, A_2, B_1, B_2, twist, axial: force and moment in the cover's frame
-    across: list[list[float]]  # (3, 2), directions across the tube, near the cover's y and z
+    ways: list[list[float]]  # (3, 3), directions across the tube, near the cover's y and z, and along it
     is_moment_only: bool
 
 
@@ -172,9 +172,9 @@ class ContactInference:
         if residual > self._parameters.largest_residual:
             reasons |= Reason.MORE
         place = end if is_unknown else fit.position
-        f1, f2 = fit.force_at_end if is_unknown else fit.force
+        f1, f2, along = fit.smallest if is_unknown else (*fit.force, 0.0)
         share = (place - start) / (end - start)
-        fx, fy, fz = [f1 * e1 + f2 * e2 for e1, e2 in cover.across]
+        fx, fy, fz = [f1 * e1 + f2 * e2 + along * e3 for e1, e2, e3 in cover.ways]
         point = [first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)]
         force = fx, fy, fz
         return Hypothesis(
@@ -216,6 +216,6 @@ def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:
         start=start.tolist(),
         end=end.tolist(),
         wrenches=np.hstack((forces, moments)),
-        across=across.T.tolist(),
+        ways=np.column_stack((*across, axis)).tolist(),
         is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
     )
