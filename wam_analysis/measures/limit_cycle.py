@@ -71,14 +71,15 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     drift = np.column_stack([centre, np.cos(turn), np.sin(turn), np.ones(n)])
     flat = flat - centre * np.linalg.lstsq(drift, flat, rcond=None)[0][0]
     phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
-    folded = _fold(flat, phase, phases)
+    loud = noise(flat)
+    folded = _fold(flat, phase, phases, loud)
     if math.isnan(period) and n >= 2 * CYCLE.cycles * lag:
         cells = max(min(phases, int(lag) // 2), 2)  # each has a sample of every cycle
-        once, twice = (_fold(flat, np.arange(n) / (k * lag) % 1.0, k * cells).explained for k in (1, 2))
+        once, twice = (_fold(flat, np.arange(n) / (k * lag) % 1.0, k * cells, loud).explained for k in (1, 2))
         if 1.0 - twice < (1.0 - CYCLE.sure) * (1.0 - once):  # every other cycle is alike
             return limit_cycle(time, value, 2.0 * lag * seconds)
     half = n // 2
-    first, second = (_fold(flat[rows], phase[rows], phases).size for rows in (slice(half), slice(half, n)))
+    first, second = (_fold(flat[rows], phase[rows], phases, loud).size for rows in (slice(half), slice(half, n)))
     growth = second / first if first > 0.0 else math.inf
     change = abs(second - first) / max(first, second, 1e-300)
     return LimitCycle(
@@ -102,7 +103,7 @@ def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
     period : s.
     """
     phases = max(min(CYCLE.phases, len(value) // CYCLE.phase_samples), 2)
-    return _fold(value - np.mean(value), time / period % 1.0, phases).size
+    return _fold(value - np.mean(value), time / period % 1.0, phases, noise(value)).size
 
 
 def _period(flat: Numbers) -> float:
@@ -162,7 +163,8 @@ class _Folded(NamedTuple):
     explained: float
 
 
-def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
+def _fold(flat: Numbers, phase: Numbers, phases: int, loud: float) -> _Folded:
+    """The mean cycle of a signal with a noise of sd `loud`."""
     samples = 1.0 / float(np.median(np.diff(phase) % 1.0))
     if samples < CYCLE.few_samples:
         return _fitted(flat, phase, phases, max(math.ceil(0.5 * samples) - 1, 1))
@@ -173,7 +175,7 @@ def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
     shape = np.interp(np.arange(phases), known, shape[known], period=phases)
     explained, rest = _explained(flat, shape[cell], len(known))
     seen = shape[count > 0.5 * np.mean(count[known])]  # of few samples a mean is noise
-    scatter = math.sqrt(min(rest, noise(flat) ** 2) * len(seen) / len(flat))
+    scatter = math.sqrt(min(rest, loud**2) * len(seen) / len(flat))
     size = float(np.ptp(seen)) - _luck(np.max(seen) - seen, scatter) - _luck(seen - np.min(seen), scatter)
     return _Folded(shape, max(size, 0.0), explained)
 
