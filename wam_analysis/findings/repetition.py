@@ -140,6 +140,8 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_period:
             continue  # the commanded motion itself, which it does not follow linearly, or the steps of its messages
+        if quantity in command.values and one.cycle.peak_to_peak < CYCLE.commanded * _commanded_size(one, command):
+            continue  # a part of it, likewise
         order = 1.0 / (one.cycle.period * frequency) if frequency > 0.0 else math.inf
         is_harmonic = order <= 0.5 + CYCLE.harmonics and abs(order - round(order)) <= CYCLE.near_harmonic
         error = (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak
@@ -195,6 +197,15 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
     cycle = limit_cycle(time, held(command, known, time))
     is_small = known == quantity and cycle.peak_to_peak < CYCLE.commanded * one.cycle.peak_to_peak
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
+
+
+def _commanded_size(one: Episode, command: Source) -> float:
+    """Peak to peak of the part of the command with the period of an episode."""
+    time = np.linspace(one.begin, one.end, round(40.0 * one.cycle.cycles))
+    ((known, _),) = command.values.items()
+    sent = held(command, known, time)
+    turns = np.hanning(len(time)) * (sent - np.mean(sent)) * np.exp(-2j * np.pi * time / one.cycle.period)
+    return 8.0 * float(np.abs(np.mean(turns)))
 
 
 def is_known(command: Source, time: Numbers) -> bool:

@@ -47,9 +47,10 @@ def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     """Limit cycles in windows of the whole, of half, of a quarter ... of a signal.
 
     Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
-    window or beyond it, and is evaluated between these ends.  A motion that decays between them is none, one that grows
-    is one.  There, windows of four of its periods and shorter ones may hold a faster one, as a vibration in a slow
-    motion: one that ends within a period, or has half of its period, is part of its shape.
+    window or beyond it, and is evaluated between these ends; where a step disturbs it there, between those at which the
+    amplitude is doubled, too.  A motion that decays between them is none, one that grows is one.  There, windows of
+    four of its periods and shorter ones may hold a faster one, as a vibration in a slow motion: one that ends within a
+    period, or has half of its period, is part of its shape.
     """
     n = length = len(value)
     longest = np.full(n, n)  # window that is looked at
@@ -65,29 +66,36 @@ def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             if cycle is None:
                 continue
             flat = without_drift(time, value, cycle.period)
-            first, last = _extended(time, flat, rows, cycle.period, longest >= length)
+            amplitude = _amplitude(time, flat, cycle.period)
+            whole = _width(time, cycle.period) // 2
+            size = np.quantile(amplitude[rows][whole:-whole], 0.75)  # the window may have quiet parts and a loud one
             lag = cycle.period / float(time[1] - time[0])
             edge = round(CYCLE.edge * lag)
-            inner = slice(first + edge if first else 0, last - edge if last < n else n)
-            if inner.stop - inner.start < CYCLE.episode_cycles * lag:
-                inner = slice(first, last)  # with its ends within the recording
-            both = (_cycle(time[inner], signal[inner], least, cycle.period) for signal in (value, flat))
-            better = max(filter(None, both), key=lambda one: one.confidence, default=None)
-            slower = np.max(longest[first:last] % n) / CYCLE.slowest_cycles  # lag of one that is there, or 0
-            is_shape = last - first < slower or abs(2.0 * lag - slower) < CYCLE.same_period * slower
-            goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
-            changing = None if better or is_shape else _changing(time[inner], flat[inner], cycle.period)
+            for most in (math.inf, 2.0):
+                is_part = (amplitude >= 0.5 * size) & (amplitude <= most * size) & (longest >= length)
+                first, last = _widest(is_part, rows)
+                inner = slice(first + edge if first else 0, last - edge if last < n else n)
+                if inner.stop - inner.start < CYCLE.episode_cycles * lag:
+                    inner = slice(first, last)  # with its ends within the recording
+                both = (_cycle(time[inner], signal[inner], least, cycle.period) for signal in (value, flat))
+                better = max(filter(None, both), key=lambda one: one.confidence, default=None)
+                slower = np.max(longest[first:last] % n) / CYCLE.slowest_cycles  # lag of one that is there, or 0
+                is_shape = last - first < slower or abs(2.0 * lag - slower) < CYCLE.same_period * slower
+                goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
+                changing = None if better or is_shape else _changing(time[inner], flat[inner], cycle.period)
+                if better or is_shape or changing:
+                    break
             if is_shape or goes_on or changing:
                 if changing and changing.growth > 1.0 and changing.cycles >= CYCLE.episode_cycles:
                     found.append(Episode(float(time[first]), float(time[last - 1]), changing))
                 transients.append(_Transient(first, last, cycle.period, _width(time, cycle.period)))
                 lag = 0.0  # its last part is no limit cycle
+            elif better is None:
+                continue
             else:
-                if better is None:  # a step disturbs it elsewhere
-                    if cycle.cycles < 4 * CYCLE.episode_cycles:
-                        continue
-                    first, last = begin, begin + length
-                found.append(Episode(float(time[first]), float(time[last - 1]), better or cycle))
+                if most < math.inf and last - first < length:  # it is in all of the window
+                    first, last, better = begin, begin + length, cycle
+                found.append(Episode(float(time[first]), float(time[last - 1]), better))
             longest[first:last] = CYCLE.slowest_cycles * lag  # a faster one may be there
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
@@ -142,19 +150,20 @@ def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
     return value
 
 
-def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: Mask) -> tuple[int, int]:
-    """Rows between which the amplitude at a period, averaged over two, is above half of what it is where it cycles.
-
-    Of several such stretches it is the one that holds most of the window, which may have quiet parts.
-    """
+def _amplitude(time: Numbers, flat: Numbers, period: float) -> Numbers:
+    """Half of the amplitude at a period, averaged over two, (n,)."""
     width = _width(time, period)
     turns = flat * np.exp(-2j * np.pi * (time - time[0]) / period)
     total, row = np.concatenate([[0.0], np.cumsum(turns)]), np.arange(len(flat))
     low, high = np.maximum(row - width // 2, 0), np.minimum(row + width // 2, len(flat))  # narrower at both ends
-    amplitude = np.abs(total[high] - total[low]) / (high - low)
-    inside = amplitude[rows][width // 2 : -(width // 2)]
-    size = float(np.sum(inside**3) / np.sum(inside**2))  # quiet parts do not count
-    parts = runs((amplitude >= 0.5 * size) & free)
+    return np.asarray(np.abs(total[high] - total[low]) / (high - low))
+
+
+def _widest(mask: Mask, rows: slice) -> tuple[int, int]:
+    """The rows between which a mask is true, that hold most of a window; the window where it is true nowhere."""
+    if not np.any(mask[rows]):
+        return rows.start, rows.stop
+    parts = runs(mask)
     shared = np.minimum(parts[:, 1], rows.stop) - np.maximum(parts[:, 0], rows.start)
     first, last = parts[int(np.argmax(shared))].tolist()
     return first, last
