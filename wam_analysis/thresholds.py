@@ -15,6 +15,9 @@ class ShaftThresholds:
     window: float = 0.03  # s over which friction is averaged
     widest_window: float = 0.24  # s, likewise, of a joint whose motions are long
     of_motion: float = 0.25  # of a motion in one direction: so much of it is averaged over
+    # of a joint without velocities: standard deviations of its position, within which it stays at rest
+    stays: float = 10.0
+    slow: float = 0.05  # of its largest speed: slower motions are rest, where this takes a long time
     noisy: float = 6.0  # standard deviations of the noise of a velocity: a joint that is slower is at rest
     far: float = 20.0  # resolutions of a position: who moves so far has moved
     rest_samples: int = 3  # of a rest between motions: fewer may be a turn
@@ -95,7 +98,8 @@ class CycleThresholds:
     loud_swing: float = 8.0  # standard deviations of the noise: likewise
     still_shaft: float = 1e-4  # rad; a shaft that moves less does not swing
     loud: float = 4.0  # standard deviations of the noise: a smaller cycle is not reported
-    commanded: float = 0.2  # of a cycle: a command that is smaller does not cause it
+    # of a cycle: a smaller command does not cause it; of a command: a smaller cycle is a part of it
+    commanded: float = 0.2
     longest_lag: float = 0.15  # s by which a joint may follow its command
     lags: int = 40  # steps of that lag at most
     singular: float = 1e-8  # of the largest singular value: smaller ones of a command are rounding
@@ -241,6 +245,7 @@ class StreamThresholds:
     latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
     seconds: float = 1e18  # a time below this is in seconds or less, above it in ns since 1970
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
+    spikes: float = 0.05  # of the steps of a position: so many may lead to single wrong values and back
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
     exact: int = 1000  # ns: waits that differ by less are one
     steps: int = 64  # from stamp to stamp, from which a rate is known

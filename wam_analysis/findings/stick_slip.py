@@ -11,7 +11,7 @@ from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.findings.topics import in_words
 from wam_analysis.foreign.pieces import Piece, pieces, resolution, rests, ways
 from wam_analysis.foreign.source import Source
-from wam_analysis.measures.runs import at_rest, runs, without_turns
+from wam_analysis.measures.runs import at_rest, runs, stays, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
@@ -103,20 +103,24 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     begins: list[float] = []
     placed = source.only("position")
     positions = placed.values.get("position", np.zeros(0))
-    sd = resolution(positions)
+    hidden = resolution(positions) * (SHAFT.noisy if "velocity" in source.values else SHAFT.stays)  # by noise
     moving = [q for q in ("velocity", "position") if q in source.values]
     moved = max(moving, key=lambda q: np.count_nonzero(np.isfinite(source.values[q])), default="")
     for piece in pieces(source, moved) if moved else ():
         rest, velocity = rest_speed(piece, least), piece.values["velocity"]
-        slowest = max(slowest, rest * (rest > least))
         least_rows = max(1, round(SHAFT.shortest_phase / piece.period))
-        still = at_rest(velocity, rest, least_rows)
+        if "velocity" in source.values:
+            still = at_rest(velocity, rest, least_rows)
+        else:
+            still, rest, least_rows = _staying(piece, least)
+            velocity = np.where(still, 0.0, velocity)
+        slowest = max(slowest, rest * (rest > least))
         total += len(still)
         shortest = max(shortest, max(least_rows, SHAFT.rest_samples) * piece.period)
         at = np.interp(piece.time, placed.time, positions) if len(positions) else None
-        still = without_turns(still, velocity, rest, at, sd, piece.period)
+        still = without_turns(still, velocity, rest, at, hidden, piece.period)
         if at is not None:
-            still = _with_noise(still, at, SHAFT.passing * rest * piece.period, SHAFT.noisy * sd)
+            still = _with_noise(still, at, SHAFT.passing * rest * piece.period, hidden)
         first = runs(~still)[:, 0]
         goes_on = at is not None and abs(at[0] - place) > rest * (piece.time[0] - ended)  # over a gap, in motion
         place, ended = math.nan if at is None or still[-1] else at[-1], piece.time[-1]
@@ -138,6 +142,17 @@ def _with_noise(still: Mask, position: Numbers, way: float, least: float) -> Mas
         if end - begin < SHAFT.window_samples and moved < way * (end - begin) + least:
             found[begin:end] = True
     return found
+
+
+def _staying(piece: Piece, least: float) -> tuple[Mask, float, int]:
+    """The rests, (n,), by positions alone, above which speed they show a motion, and over how many samples.
+
+    Longer rests show slower motions.
+    """
+    reach, speed = SHAFT.stays * piece.noise["position"], np.percentile(np.abs(piece.values["velocity"]), 95.0)
+    wait = min(max(reach / max(least, SHAFT.slow * float(speed)), STREAM.widest), SHAFT.widest_window)
+    rows = max(math.ceil(wait / piece.period), SHAFT.rest_samples)
+    return stays(piece.values["position"], reach, rows), max(least, reach / (rows * piece.period)), rows
 
 
 def rest_speed(piece: Piece, least: float) -> float:

@@ -62,26 +62,27 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
             even = np.linspace(time[0], time[-1], number)
             values = {q: np.interp(even, time, v) for q, v in values.items()}
             time = even
-        sd = {q: resolution(v) for q, v in values.items()}
+        sd = {q: resolution(v, recorded[q]) for q, v in values.items()}
         if "position" in values and "velocity" not in values:
             values = dict(values)
-            values["velocity"], sd["velocity"] = differentiated(time, values["position"])
+            values["velocity"], sd["velocity"] = differentiated(time, values["position"], sd["position"])
         found.append(Piece(time, values, sd, stamps, recorded))
     return found
 
 
-def resolution(value: Numbers) -> float:
-    """Standard deviation of the noise of a signal, or of its rounding to the steps of an encoder.
+def resolution(value: Numbers, recorded: Numbers | None = None) -> float:
+    """Standard deviation of the noise of a signal, or of the rounding of what was recorded to the steps of an encoder.
 
     What moves by the same in every sample shows no rounding.
     """
-    steps = np.diff(value)
-    quantum = count(value)
+    recorded = value if recorded is None else recorded
+    steps = np.diff(recorded)
+    quantum = count(recorded)
     if quantum == math.inf:
         return 0.0
     counts = np.abs(steps[steps != 0.0]) / quantum
     # from place to place, to stay there, as a gripper does: no flicker of an encoder
-    is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(value) and np.std(steps) < np.std(value)
+    is_step = SHAFT.joint_rest < quantum >= 0.5 * np.ptp(recorded) and np.std(steps) < np.std(recorded)
     is_even = is_step or np.ptp(steps) < 0.5 * quantum
     is_rounded = not is_even and np.all(np.abs(counts - np.rint(counts)) < 0.05) and np.median(counts) < 1e3
     return max(noise(value), quantum / math.sqrt(12.0) if is_rounded else 0.0)
@@ -98,17 +99,18 @@ def rests(source: Source) -> bool:
     return bool((flickers or most <= SHAFT.noisy * sd) and np.ptp(position) <= SHAFT.far * sd)
 
 
-def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
+def differentiated(time: Numbers, position: Numbers, noise: float) -> tuple[Numbers, float]:
     """Rate of a position, and its noise: slope of a line through as many samples as it needs, within `widest`.
 
     Parameters
     ----------
     time : (n,), s, at a constant rate.
     position : (n,).
+    noise : of the position.
     """
     period = float(time[1] - time[0])
     speed = float(np.percentile(np.abs(np.gradient(position, period)), 95.0))
-    sd = resolution(position) / period
+    sd = noise / period
     half = 1
     while (
         half * period < STREAM.widest / 2.0
@@ -133,7 +135,10 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
     for piece in pieces(shown) if has_both else ():
         width = max(1, round(STREAM.averaged / piece.period))
         while len(piece.time) > width + 1:
-            span, least = width * piece.period, SHAFT.noisy * resolution(piece.recorded["position"])
+            span, least = (
+                width * piece.period,
+                SHAFT.noisy * resolution(piece.recorded["position"]),
+            )
             way, by = ways(piece, width)
             if np.max(np.abs(way)) > 2.0 * least:
                 rate = way / span

@@ -48,7 +48,7 @@ def _without_wraps(one: Source) -> Source:
 
 def _without_spikes(one: Source) -> Source:
     """A source without single samples that are away from those before and after."""
-    at, moves = _jumps(one)
+    at, moves = _jumps(one, STREAM.spikes)
     back = at[:-1][moves[:-1] * moves[1:] < 0.0]
     for quantity, value in one.values.items():
         # a zero that would move and move back is a single sample, too
@@ -198,17 +198,19 @@ def _unwrapped(time: Numbers, position: Numbers, speed: Numbers, is_command: boo
     return position, 0, math.nan
 
 
-def _jumps(one: Source) -> tuple[Numbers, Numbers]:
+def _jumps(one: Source, rare: float = STREAM.repeated) -> tuple[Numbers, Numbers]:
     """Times, s, and by how much the zero of the position moved before each: by what the velocity does not explain."""
     shown = one.only("position", "velocity")
     if "position" not in shown.values:
         return np.zeros(0), np.zeros(0)
     velocity = shown.values.get("velocity", np.zeros(1))
     known = velocity if np.any(velocity) else None
-    return shown.time, jumps(shown.time, shown.values["position"], SHAFT.joint_rest, known)
+    return shown.time, jumps(shown.time, shown.values["position"], SHAFT.joint_rest, known, rare)
 
 
-def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None = None) -> Numbers:
+def jumps(
+    time: Numbers, value: Numbers, least: float, velocity: Numbers | None = None, rare: float = STREAM.repeated
+) -> Numbers:
     """By how much a signal jumps before each sample, (n,), 0 where it does not.
 
     It is what its velocity does not explain, or, where none was recorded, the steps before and after.
@@ -217,6 +219,7 @@ def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None 
     ----------
     time, value, velocity : (n,).
     least : a smaller step is no jump.
+    rare : part of the steps that may be jumps.
     """
     result = np.zeros(len(value))
     if len(value) < SHAFT.fewest_samples:
@@ -231,7 +234,7 @@ def jumps(time: Numbers, value: Numbers, least: float, velocity: Numbers | None 
         moved, fastest = rate * waits, np.abs(rate)
         finest = count(value)
     rest = steps - moved
-    usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - STREAM.repeated), finest)
+    usual = STREAM.zero * max(np.quantile(np.abs(rest), 1.0 - rare), finest)
     is_jump = np.abs(rest) > np.maximum(STREAM.beyond * fastest * waits, max(usual, least))
     result[1:] = np.where(is_jump & ~after_gaps(time)[1:], rest, 0.0)
     return result

@@ -111,8 +111,23 @@ def at_rest(velocity: Numbers, rest: float, shortest: int) -> Mask:
     return without_short(np.abs(velocity) <= rest, shortest)
 
 
+def stays(value: Numbers, reach: float, rows: int) -> Mask:
+    """Samples to which a signal came in a stretch that stays within a reach for at least so many steps, (n,)."""
+    if len(value) <= rows:
+        return np.full(len(value), np.ptp(value) <= reach)
+    still = np.ptp(sliding_window_view(value, rows + 1), axis=1) <= reach
+    total = np.cumsum(np.pad(still, (rows, rows - 1)))
+    steps = total[rows:] > total[:-rows]
+    return np.concatenate((steps[:1], steps))
+
+
 def without_turns(
-    still: Mask, velocity: Numbers, rest: float, position: Numbers | None = None, sd: float = 0.0, period: float = 1.0
+    still: Mask,
+    velocity: Numbers,
+    rest: float,
+    position: Numbers | None = None,
+    hidden: float = 0.0,
+    period: float = 1.0,
 ) -> Mask:
     """The rests without those in which a smooth motion only turns back or is slow, as a slow sine does.
 
@@ -125,13 +140,13 @@ def without_turns(
     still : (n,), see `at_rest`.
     velocity : (n,), rad/s or m/s.
     rest : speed up to which it was counted as at rest.
-    position, sd : (n,), and the standard deviation of its noise, which hides a turn; None for the way of the velocity.
+    position, hidden : (n,), and how far a turn is hidden by its noise; None for the way of the velocity.
     period : s from sample to sample.
     """
     at = np.cumsum(velocity) * period if position is None else position
 
     def sticks(begin: int, end: int) -> bool:
-        if np.ptp(np.percentile(at[begin:end], (5.0, 95.0))) > rest * period * (end - begin) + SHAFT.noisy * sd:
+        if np.ptp(np.percentile(at[begin:end], (5.0, 95.0))) > rest * period * (end - begin) + hidden:
             return False
         if not begin or end == len(velocity):
             return end - begin >= SHAFT.rest_samples
@@ -145,7 +160,7 @@ def without_turns(
             return 2 * len(quiet) >= end - begin
         ways = [np.ptp(at[first - count : first + 1]), np.ptp(at[last : last + count + 1])]
         inside = np.ptp(np.percentile(at[first : last + 1], (5.0, 95.0)))
-        return bool(max(ways) > SHAFT.turn * max(inside, SHAFT.noisy * sd))
+        return bool(max(ways) > SHAFT.turn * max(inside, hidden))
 
     kept = np.zeros_like(still)
     for begin, end in runs(still).tolist():
