@@ -168,7 +168,8 @@ def rising(stamps: Times, received: Times) -> Times:
 def _sets(stamps: Times, received: Times) -> Index:
     """Rows after which the stamps go back, or skip periods that the receptions do not, and stay as much older or newer.
 
-    A message that was late does so for a moment; delays that change at random do so within their range.
+    A message that was late does so for a moment; delays that change at random do so within their range.  Of messages
+    that waited, as for a busy recorder, the next ones come at once.
     """
     steps = np.diff(stamps)
     skipped = (steps > STREAM.filled * np.median(steps)) & (steps > STREAM.filled * np.diff(received))
@@ -179,4 +180,5 @@ def _sets(stamps: Times, received: Times) -> Index:
     windows = sliding_window_view((received - stamps) - (received[0] - stamps[0]), STREAM.near)
     before, after = windows[rows - edge], windows[rows + 1]
     apart = np.maximum(after.min(axis=1) - before.max(axis=1), before.min(axis=1) - after.max(axis=1))
-    return rows[2 * apart > np.abs(steps[rows])]
+    pace = [np.median(sliding_window_view(steps, edge)[side], axis=1) for side in (rows - edge, rows + 1)]
+    return rows[(2 * apart > np.abs(steps[rows])) & (2 * np.minimum(*pace) > np.median(steps))]

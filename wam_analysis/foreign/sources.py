@@ -98,9 +98,10 @@ def alternates(source: Source) -> bool:
     """Whether a quantity jumps away and back from message to message, as where two publishers share a topic.
 
     Two messages away on either side a value is near one of both: at the turn of a fast vibration it is near none.
+    Messages of another publisher come in addition; single wrong values are in the place of right ones.
     """
     for quantity in source.values:
-        values = source.only(quantity).values[quantity]
+        time, values = (one := source.only(quantity)).time, one.values[quantity]
         if len(values) < SHAFT.fewest_samples:
             continue
         before, last, here, then, after = sliding_window_view(values, 5).T
@@ -115,7 +116,8 @@ def alternates(source: Source) -> bool:
             CYCLE.still_shaft / STREAM.zero if quantity == "position" else 0.0,
         )
         away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, coarse))
-        if np.mean(away) > (STREAM.repeated / 2.0 if quantity == "position" else 0.5):
+        is_more = time[3:-1] - time[1:-3] < STREAM.changes * np.median(np.diff(time))
+        if np.mean(away) > 0.5 or (quantity == "position" and np.mean(away & is_more) > STREAM.repeated / 2.0):
             return True
     return False
 
