@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wam_analysis.foreign.clocks import BILLION, dates, joined_times, nanoseconds
-from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
+from wam_analysis.foreign.topic_map import COMMANDED, QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS, UNNAMED, joint_columns
@@ -18,7 +18,8 @@ from wam_description.topics import TRAJECTORY
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 INTERFACES = "control_msgs/msg/DynamicJointState"
-POINTS = {"feedback": "", "actual": "", "reference": " command", "desired": " command"}  # of controllers, new and old
+SENT = " command"  # behind the topic of a message, of what was commanded in it
+POINTS = {"feedback": "", "actual": "", "reference": SENT, "desired": SENT}  # of controllers, new and old
 OF_POINT = {"position": "positions", "velocity": "velocities", "effort": "effort"}
 FIELDS = {  # of the types that are known: suffix of the topic, and fields by quantity
     JOINTS: [("", {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"})],
@@ -72,7 +73,7 @@ def foreign_bag(source: Bag, given: TopicMap) -> Bag:
                 continue  # names that a controller of this version leaves empty
             topics[part] = _scaled(found, given)
             kind = bag.types[name]
-            is_command = part in given.commands or kind == TRAJECTORY or (kind == CONTROLLER and part != name)
+            is_command = part in given.commands or kind == TRAJECTORY or SENT in part
             types[part] = COMMAND if is_command else kind
     return checked(bag._replace(topics=topics, types=types), given)
 
@@ -115,7 +116,7 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
             if has_joints:
                 yield topic + suffix, _joints(topic, columns, fields, given)
             if has_wrench:
-                yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, fields, given)
+                yield topic + suffix + " wrench" * has_joints, _wrench(topic, columns, fields, given)
 
 
 def _fields(kind: str, messages: Sequence[Any], given: TopicMap) -> Iterable[tuple[str, Mapping[str, str]]]:
@@ -126,10 +127,13 @@ def _fields(kind: str, messages: Sequence[Any], given: TopicMap) -> Iterable[tup
     ]
     own = [one for one in known if one[1].keys() - {"name"}]
     mapped = {q: path for q, path in given.fields.items() if all(_has(messages, part) for part in path.split(","))}
+    sent = {q.removeprefix(COMMANDED): mapped.pop(q) for q in [*mapped] if q.startswith(COMMANDED)}
     if not own:
-        return [("", mapped)]
-    (suffix, first), *_ = own
-    return [(suffix, first | {q: path for q, path in mapped.items() if q in (*first, "stamp")})] if mapped else own
+        own = [("", mapped)]
+    elif mapped:
+        (suffix, first), *_ = own
+        own = [(suffix, first | {q: path for q, path in mapped.items() if q in (*first, "stamp")})]
+    return [*own, (SENT, {q: path for q, path in own[0][1].items() if q in ("name", "stamp")} | sent)] if sent else own
 
 
 def _has(messages: Iterable[Any], path: str) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from wam_analysis.foreign.clocks import dates, joined_times, nanoseconds
 from wam_analysis.foreign.reading import COMMAND, checked
-from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap, unit_of
+from wam_analysis.foreign.topic_map import COMMANDED, QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
@@ -22,7 +22,6 @@ TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](?!\d+[\])])(.*)[\])]\s*)?")  # and t
 ABOVE = re.compile(r"#|sep=")  # begins a line above the titles
 DELIMITERS = " ,;\t|"  # blanks, if the titles have none of the others
 NO_NUMBER = ("", "nan", "na", "n/a", "null", "none", "-")  # cells of what was not recorded
-COMMANDED = "command."  # begins the title of a column that was commanded
 COMMANDS = f"Columns of commands have the titles {COMMANDED}position.JOINT, {COMMANDED}force.x and so on"
 UNUSED = "unused column"  # in place of the type of a topic
 RENAMED = (
@@ -107,8 +106,8 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap) -> tuple[B
     ValueError
         if a topic or a field of names is given, or a joint that it has not.
     """
-    if given.topics or given.commands or "name" in given.fields:
-        raise ValueError(f"{path} is a table: leave out --topic, --command and --map name. {COMMANDS}")
+    if given.topics or given.commands or given.fields.keys() - QUANTITIES:
+        raise ValueError(f"{path} is a table: leave out --topic, --command and --map of names or commands. {COMMANDS}")
     _require_once(path, [*map(str, series)])
     given = _with_time(series, given)
     units = dict(given.units)
@@ -258,13 +257,16 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
         name = whole.removeprefix(COMMANDED)
         begin = name[: len(wanted)]
         if wanted == (begin if quantity in given.fields else begin.lower()) and name[len(wanted) :][:1] in ("", "."):
-            if unit in UNITS and quantity in given.units and unit_of(quantity, unit) != given.scaled(quantity):
+            is_given = quantity in given.units
+            factor, shown = given.scaled(quantity) if is_given or not unit else unit_of(quantity, unit)
+            titled = unit_of(quantity, unit) if is_given and unit in UNITS else (factor, shown)
+            # a factor may be that of another quantity, as N m per A
+            if titled != (factor, shown) and (titled[1] == shown or factor == 1.0):
                 raise ValueError(
                     f"'{title}' has the unit {unit}, and --unit gives another one for {quantity}; leave out --unit, or "
                     "take the unit out of the title"
                 )
-            has_unit = bool(unit) and quantity not in given.units
-            factor, shown = unit_of(quantity, unit) if has_unit else given.scaled(quantity)
+            has_unit = bool(unit) and not is_given
             own = name[len(wanted) + 1 :]
             found.append(_Column(factor, shown, has_unit, own, name != whole, str(title), series[title]))
     if len(shown_in := dict.fromkeys(one.shown for one in found)) > 1:

@@ -8,7 +8,8 @@ QUANTITIES = {  # units that are shown: that of ROS, of linear joints, others
     "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"), "force": ("N",),
     "torque": ("N m",), "stamp": ("s",),
 }  # fmt: skip
-MAPPED = (*QUANTITIES, "name")
+COMMANDED = "command."  # begins a quantity that was commanded, and the title of its column
+MAPPED = (*QUANTITIES, "name", *(COMMANDED + quantity for quantity in QUANTITIES if quantity != "stamp"))
 WAYS = {
     "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "turn": math.tau, "rev": math.tau},
     "m": {"m": 1.0, "mm": 1e-3},
@@ -33,7 +34,7 @@ class TopicMap(NamedTuple):
     topics : the only ones that are analysed; all if empty.
     joints : the only ones; where a message has no names, the names of its values.
     commands : topics of commands, besides those whose name shows it.
-    fields : path in the message by quantity, such as 'effort': 'current'.
+    fields : path in the message by quantity, such as 'effort': 'current', 'command.position': 'goal'.
     units : factor and unit that is shown by quantity.
     """
 
