@@ -43,15 +43,14 @@ def contact_section(recording: AnalysedRecording) -> Section:
         right = 100.0 * float(np.mean(both[touching]))
         away = 100.0 * median(np.abs(sensed.position - true.position)[is_estimate])
         off = median(np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate])
-        vector = "norm of the error vector; without forces that are lower bounds"
         findings += [
             Finding("correct link, of true contact time", "%", right),
-            Finding("position error, median", "cm", away, note="along the link, of all samples"),
-            Finding("norm of the force error, median", "N", off, note=vector),
+            Finding("position error, median", "cm", away, note="along the link"),
+            Finding("force error where the position is known, median", "N", off, note="norm of the vector"),
         ]
         medians = {"position": shown(away, "cm"), "force vector": shown(off, "N")}
         errors = ", ".join(f"{what} {error}" for what, error in medians.items() if error != "-")
-        errors = f"; median error of all samples: {errors}" * bool(errors)
+        errors = f"; median error where the position is known: {errors}" * bool(errors)
         shows.append(f"Contacts: correct link for {right:.3g} % of true contact time{errors}.")
     if np.any(known):
         note = "false contacts, and the ends of others"

@@ -8,6 +8,7 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.force import fate_words
 from wam_analysis.findings.force_steps import UNSTABLE, force_steps, many_steps
 from wam_analysis.findings.repetition import LEAST
+from wam_analysis.foreign.pieces import rests
 from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.held_messages import value_changes
 from wam_analysis.measures.following import Following, following
@@ -26,6 +27,9 @@ def following_section(recording: AnalysedRecording) -> Section | None:
         for quantity in quantities[: 1 if one.is_joint else len(AXES)]:
             name, unit = f"{one.label} {quantity}", one.units[quantity]
             measured, wanted = one.only(quantity), command.only(quantity)
+            if rests(measured) and np.ptp(command.values[quantity]) > LEAST[unit]:
+                wrong.append(f"{name}: it was commanded to move, and never did.")
+                continue
             found, steps = _following(measured, wanted), force_steps(measured, wanted) if one.is_joint else []
             numbers, remarks = dict[str, tuple[float, str]](), list[str]()
             if found:

@@ -184,8 +184,7 @@ def _fate(one: HeldForce) -> tuple[str, bool]:
         why = "it was not controlled" if one.hold.is_refused else silent
         return f"{one.hold.name}: {why}; its stability is not known.", False
     (shaft, seen), cycle = one.swinging, one.cycle
-    is_cycle = cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded
-    if is_cycle and seen.verdict is not Verdict.DIVERGED:
+    if (is_cycle := _is_cycle(one)) and seen.verdict is not Verdict.DIVERGED:
         seen = seen._replace(verdict=Verdict.LIMIT_CYCLE)
     text = f"{one.hold.name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {fate_words(seen)}"
     if seen.verdict not in SWINGS_ON:
@@ -193,6 +192,10 @@ def _fate(one: HeldForce) -> tuple[str, bool]:
     swing, what = cycle if is_cycle else seen, "last" if seen.verdict is Verdict.DIVERGED else "limit cycle of"
     size = shown(swing.peak_to_peak, "rad" if shaft else "N")
     return f"{text}; {what} {size} peak to peak, period {shown(swing.period, 's')}.", True
+
+
+def _is_cycle(one: HeldForce) -> bool:
+    return one.cycle.confidence >= CYCLE.sure and one.cycle.peak_to_peak > CYCLE.seen * one.hold.commanded
 
 
 def fate_words(seen: Swings) -> str:
@@ -208,7 +211,7 @@ def fate_words(seen: Swings) -> str:
 def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
     name, cycle, seen, predicted = one.hold.name, one.cycle, one.swinging, theory.predicted
     size, time, sure = cycle.peak_to_peak, cycle.period, cycle.confidence
-    if not sure >= CYCLE.sure:
+    if not _is_cycle(one):
         size = time = sure = math.nan
     force = predicted.force_peak_to_peak
     yield Finding(f"{name}: limit cycle, peak to peak", "N", size, force, STICTION * math.isfinite(force))

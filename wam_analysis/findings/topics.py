@@ -27,7 +27,8 @@ def topics_section(recording: AnalysedRecording) -> Section:
     sentences = [
         line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns, bag.counts.get(name, 0))
     ]
-    wrong = [*in_words(found), *(f"{name}: {note}." for name, clock in clocks_of(bag).items() for note in clock.notes)]
+    wrong = [*(f"INCOMPLETE: {line}" for line in recording.lost), *in_words(found)]
+    wrong += [f"{name}: {note}." for name, clock in clocks_of(bag).items() for note in clock.notes]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
         f"took turns; the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
