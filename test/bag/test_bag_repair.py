@@ -20,6 +20,8 @@ from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
 from wam_analysis.findings.analysis import analyse_bag
+from wam_analysis.findings.topics import topics_section
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
@@ -215,6 +217,7 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     assert [line.split()[-3] for line in info if line.endswith("are gone")] == [str(gone[t]) for t in sorted(gone)]
     bag = read(tmp_path / "bag")
     assert list(AnalysedRecording(bag).lost) == lines[1:]
+    assert list(topics_section(AnalysedRecording(bag, given=NOTHING_GIVEN)).wrong[:2]) == info[:2]
     found = analyse_bag(bag, lambda doing: None)
     assert list(found.sections[1].wrong[:2]) == info[:2]
     assert found.sections[0].sentences[1].startswith(f"Problems: {info[0]}")

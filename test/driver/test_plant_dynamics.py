@@ -486,9 +486,7 @@ def thrown(seed: int, friction: float, hardening: float, step: float) -> Plant:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1))
 @pytest.mark.parametrize(("friction", "hardening"), [(0.0, 0.0), (0.4, 50.0)])
-def test_energy_of_the_undriven_arm_never_grows_with_everything_on(
-    seed: int, friction: float, hardening: float
-) -> None:
+def test_energy_of_the_undriven_arm_never_grows_with_all_on(seed: int, friction: float, hardening: float) -> None:
     """To 1e-4 J of some 12 J lost: nearest points of tube and bar are found to 1e-6 m, under about 100 N."""
     plant = thrown(seed, friction, hardening, STEP)
     found, touched, slack = energies(plant, hardening, 1.5, STEP)
