@@ -18,10 +18,13 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.rigid_body import Array
 from wam_description.signals import Triple
+from wam_description.small_matrices import solution
 
 Pair = tuple[float, float]
 Gram = list[list[float]]
@@ -48,7 +51,7 @@ class Fit(NamedTuple):
     torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
         and force; infinite where they do not determine it, as of a force along the tube.
     smallest : (3,), N, across the link and along it: the force if the position were the end of the link, the longest
-        lever; that along the tube if `along` is above 0.5.
+        lever; if `along` is above 0.5 the smallest one at its start that explains the torques, as one along it does.
     residual : what the best contact does not explain, chi^2.
     """
 
@@ -217,7 +220,7 @@ class ContactFit:
         """
         grams: list[Gram] = gram.tolist()
         links = [self._link(i, one) for i, one in enumerate(grams)]
-        pieces, axial, left = self._along(grams[-1])
+        pieces, left = self._along(grams[-1])
         for i, link in enumerate(links):
             pieces += self._grid(i, link)
         pieces.sort(reverse=True)
@@ -226,7 +229,7 @@ class ContactFit:
         parts, total = self._parts(pieces)
         total += math.exp(min(other - pieces[0][0], CONTACT.largest_exponent))
         each = zip(links, parts, self._ends, strict=True)
-        return [self._fit(link, part, total, ends, axial, left) for link, part, ends in each]
+        return [self._fit(link, part, total, ends, grams[-1], left) for link, part, ends in each]
 
     def _link(self, i: int, gram: Gram) -> _Link:
         """A link with the tangential force in the covariance, of the size at the likeliest of some places.
@@ -272,16 +275,15 @@ class ContactFit:
         constant, width = link.constant + self._end_frequency, CONTACT.end_length
         return pieces + [(link.log_density(x) + constant, x, width, i, False) for x in self._meeting[i]]
 
-    def _along(self, gram: Gram) -> tuple[list[Piece], float, float]:
+    def _along(self, gram: Gram) -> tuple[list[Piece], float]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
-        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns its size,
-        N, and what the best of them does not explain, chi^2, too.
+        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns what the
+        best of them does not explain, chi^2, too.
         """
         scale, precision, (_, end) = self._given.force_scale, self._precision, self._ends[-1]
         r, a1, a2, b1, b2, _, axial = gram
-        force = r[AXIAL] / (axial[AXIAL] + precision)
-        size = abs(force) + CONTACT.smallest_force
+        size = abs(r[AXIAL]) / (axial[AXIAL] + precision) + CONTACT.smallest_force
         rarity, inner = self._log_rarity(size), [[r[0], r[AXIAL]], [r[AXIAL], axial[AXIAL]]]
         found: list[Piece] = []
         left = math.inf
@@ -295,7 +297,14 @@ class ContactFit:
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
             found.append((value + frequency, x, width, len(self._ends) - 1, True))
             left = min(left, rr - ra * ra / (aa + precision))
-        return found, force, left
+        return found, left
+
+    def _at_start(self, gram: Gram) -> Triple:
+        """The smallest force at the start of the last link that explains the torques, across and along it, N."""
+        at = (1, 2, AXIAL)
+        matrix = np.array([[gram[i][j] for j in at] for i in at]) + self._precision * np.eye(3)
+        f1, f2, along = solution(matrix, np.array([gram[0][i] for i in at])).tolist()
+        return f1, f2, along
 
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
         """What the pieces, the most probable first, are of each link, and the sum of their weights."""
@@ -322,7 +331,7 @@ class ContactFit:
                 part.low, part.high = min(low, part.low), max(high, part.high)  # in this order never a NaN
         return parts, total
 
-    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, axial: float, left: float) -> Fit:
+    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, last: Gram, left: float) -> Fit:
         start, end = ends
         is_along = part.along > 0.5 * part.mass
         side = (part.first - part.first_along) / max(part.mass - part.along, CONTACT.negligible)
@@ -348,7 +357,7 @@ class ContactFit:
             force_sd=math.sqrt(radial),
             direction_sd=math.pi if is_along else min(math.sqrt(about) / size, math.pi),
             torque_position_sd=math.inf if is_along else link.torque_position_sd(place, force),
-            smallest=(0.0, 0.0, axial) if is_along else (*link.force(end)[1], 0.0),
+            smallest=self._at_start(last) if is_along else (*link.force(end)[1], 0.0),
             residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
 

@@ -36,7 +36,7 @@ class Hypothesis(NamedTuple):
     low, high : m, ends of the part of the cover that is in the 90 % set of positions on all covers; NaN
         where no part is.
     force : (3,), N, of the world on the link, in the cover's frame; where the position is NaN the
-        smallest force that explains the torques, that at the far end of the link or along it.
+        smallest force that explains the torques, that at the far end of the link, or at its start.
     force_sd : N, standard deviation of its size; NaN where it is a lower bound.
     is_lower_bound : True where `force` is that smallest force.
     direction : rad, angle of the force about the link, from the cover's y to its z axis.
@@ -166,12 +166,12 @@ class ContactInference:
         residual = fit.residual / instants
         if cover.is_moment_only:
             reasons |= Reason.MOMENT_ONLY
-        elif is_unknown:
+        elif is_unknown and fit.along <= 0.5:
             sd_of_usual = fit.torque_position_sd * math.hypot(*fit.force) / self._parameters.force_scale
             reasons |= Reason.POSE if sd_of_usual > end - start else Reason.WEAK
         if residual > self._parameters.largest_residual:
             reasons |= Reason.MORE
-        place = end if is_unknown else fit.position
+        place = fit.position if not is_unknown else start if fit.along > 0.5 else end
         f1, f2, along = fit.smallest if is_unknown else (*fit.force, 0.0)
         share = (place - start) / (end - start)
         fx, fy, fz = [f1 * e1 + f2 * e2 + along * e3 for e1, e2, e3 in cover.ways]
