@@ -45,7 +45,8 @@ class _Fit(NamedTuple):
 def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> Following:
     """How a signal follows its command.
 
-    The command is a path that is sent in points, or it is held from message to message where that fits much better.
+    The command is a path that is sent in points, or it is held from message to message where that fits much better, and
+    not at the delay of a path, too, as where both are in one message: in the mean it is late by half a period.
 
     Parameters
     ----------
@@ -60,6 +61,9 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     motion = float(np.std(value)) or math.inf
     fits = [_searched(time, value, *path) for path in paths]
     is_held = fits[1].rest < SHAFT.much_better * fits[0].rest
+    if is_held:
+        earlier = fits[0].delay - 0.25 * float(np.median(np.diff(stamps)))
+        is_held = SHAFT.better * _fit(time, value, *paths[1], earlier).rest > fits[1].rest
     fit, (stamps, sent) = fits[is_held], paths[is_held]
 
     def with_play(play: float) -> _Fit:
