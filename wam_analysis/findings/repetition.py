@@ -200,12 +200,14 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
 
 
 def _commanded_size(one: Episode, command: Source) -> float:
-    """Peak to peak of the part of the command with the period of an episode."""
-    time = np.linspace(one.begin, one.end, round(40.0 * one.cycle.cycles))
+    """Peak to peak of the part of the command with the period of an episode, in that of its halves with less of it."""
     ((known, _),) = command.values.items()
-    sent = held(command, known, time)
-    turns = np.hanning(len(time)) * (sent - np.mean(sent)) * np.exp(-2j * np.pi * time / one.cycle.period)
-    return 8.0 * float(np.abs(np.mean(turns)))
+    sizes = []
+    for time in np.array_split(np.linspace(one.begin, one.end, round(40.0 * one.cycle.cycles)), 2):
+        sent = held(command, known, time)
+        turns = np.hanning(len(time)) * (sent - np.mean(sent)) * np.exp(-2j * np.pi * time / one.cycle.period)
+        sizes.append(8.0 * float(np.abs(np.mean(turns))))
+    return min(sizes)
 
 
 def is_known(command: Source, time: Numbers) -> bool:

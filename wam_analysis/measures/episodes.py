@@ -90,10 +90,10 @@ def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
                     found.append(Episode(float(time[first]), float(time[last - 1]), changing))
                 transients.append(_Transient(first, last, cycle.period, _width(time, cycle.period)))
                 lag = 0.0  # its last part is no limit cycle
-            elif better is None:
+            elif better is None and cycle.cycles < 4 * CYCLE.episode_cycles:
                 continue
             else:
-                if most < math.inf and last - first < length:  # it is in all of the window
+                if better is None or (most < math.inf and last - first < length):  # it is in all of the window
                     first, last, better = begin, begin + length, cycle
                 found.append(Episode(float(time[first]), float(time[last - 1]), better))
             longest[first:last] = CYCLE.slowest_cycles * lag  # a faster one may be there
