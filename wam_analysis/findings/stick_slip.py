@@ -135,11 +135,11 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
 
 
 def _with_noise(still: Mask, position: Numbers, way: float, least: float) -> Mask:
-    """The rests, (n,), with brief motions of the velocity alone: by less than a way per sample, and a least one."""
+    """The rests, (n,), with motions of the velocity alone: by less than `least`, brief ones by `way` per sample."""
     found = still.copy()
     for begin, end in runs(~still).tolist():
         moved = float(np.ptp(position[max(begin - 1, 0) : end + 1]))
-        if end - begin < SHAFT.window_samples and moved < way * (end - begin) + least:
+        if moved < least + way * (end - begin) * (end - begin < SHAFT.window_samples):
             found[begin:end] = True
     return found
 
@@ -149,7 +149,8 @@ def _staying(piece: Piece, least: float) -> tuple[Mask, float, int]:
 
     Longer rests show slower motions.
     """
-    reach, speed = SHAFT.stays * piece.noise["position"], np.percentile(np.abs(piece.values["velocity"]), 95.0)
+    reach = max(SHAFT.stays * piece.noise["position"], least * STREAM.widest)
+    speed = np.percentile(np.abs(piece.values["velocity"]), 95.0)
     wait = min(max(reach / max(least, SHAFT.slow * float(speed)), STREAM.widest), SHAFT.widest_window)
     rows = max(math.ceil(wait / piece.period), SHAFT.rest_samples)
     return stays(piece.values["position"], reach, rows), max(least, reach / (rows * piece.period)), rows
