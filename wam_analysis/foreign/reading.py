@@ -129,11 +129,12 @@ def _fields(kind: str, messages: Sequence[Any], given: TopicMap) -> Iterable[tup
     mapped = {q: path for q, path in given.fields.items() if all(_has(messages, part) for part in path.split(","))}
     sent = {q.removeprefix(COMMANDED): mapped.pop(q) for q in [*mapped] if q.startswith(COMMANDED)}
     if not own:
-        own = [("", mapped)]
+        own = [("", mapped)] * (not sent or not mapped.keys() <= {"name", "stamp"})
     elif mapped:
         (suffix, first), *_ = own
         own = [(suffix, first | {q: path for q, path in mapped.items() if q in (*first, "stamp")})]
-    return [*own, (SENT, {q: path for q, path in own[0][1].items() if q in ("name", "stamp")} | sent)] if sent else own
+    for_all = own[0][1] if own else mapped
+    return [*own, (SENT, {q: path for q, path in for_all.items() if q in ("name", "stamp")} | sent)] if sent else own
 
 
 def _has(messages: Iterable[Any], path: str) -> bool:

@@ -260,8 +260,8 @@ def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[
             is_given = quantity in given.units
             factor, shown = given.scaled(quantity) if is_given or not unit else unit_of(quantity, unit)
             titled = unit_of(quantity, unit) if is_given and unit in UNITS else (factor, shown)
-            # a factor may be that of another quantity, as N m per A
-            if titled != (factor, shown) and (titled[1] == shown or factor == 1.0):
+            is_constant = titled == UNITS["A"] and (factor, shown) not in UNITS.values()  # N m per A
+            if titled != (factor, shown) and not is_constant:
                 raise ValueError(
                     f"'{title}' has the unit {unit}, and --unit gives another one for {quantity}; leave out --unit, or "
                     "take the unit out of the title"
