@@ -245,7 +245,7 @@ class StreamThresholds:
     latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
     seconds: float = 1e18  # a time below this is in seconds or less, above it in ns since 1970
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
-    spikes: float = 0.05  # of the steps of a position: so many may lead to single wrong values and back
+    spikes: float = 0.02  # of the steps of a position: so many may lead to single wrong values and back
     paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
     exact: int = 1000  # ns: waits that differ by less are one
     steps: int = 64  # from stamp to stamp, from which a rate is known

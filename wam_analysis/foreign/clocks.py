@@ -180,5 +180,6 @@ def _sets(stamps: Times, received: Times) -> Index:
     windows = sliding_window_view((received - stamps) - (received[0] - stamps[0]), STREAM.near)
     before, after = windows[rows - edge], windows[rows + 1]
     apart = np.maximum(after.min(axis=1) - before.max(axis=1), before.min(axis=1) - after.max(axis=1))
-    pace = [np.median(sliding_window_view(steps, edge)[side], axis=1) for side in (rows - edge, rows + 1)]
-    return rows[(2 * apart > np.abs(steps[rows])) & (2 * np.minimum(*pace) > np.median(steps))]
+    both = np.stack([steps, np.diff(received)])
+    pace = np.median(sliding_window_view(both, edge, axis=1)[:, [rows - edge, rows + 1]], axis=-1)
+    return rows[(2 * apart > np.abs(steps[rows])) & np.all(2 * pace[0] > pace[1], axis=0)]

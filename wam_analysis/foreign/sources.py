@@ -54,7 +54,9 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 source = Source(topic, topic, name, frame, is_command, *times, away, taken, units, one.treated)
                 if np.count_nonzero(known[rows]) >= (1 if is_command else SHAFT.fewest_samples):
                     found.append(treated_source(source))
-    return _labelled(found)
+    first = min((one.sent[0] for one in found), default=0.0)  # times of reception may be later than a coarse stamp
+    since = {name: [getattr(one, name) - first for one in found] for name in ("time", "sent", "received", "away")}
+    return _labelled([one._replace(**{name: times[i] for name, times in since.items()}) for i, one in enumerate(found)])
 
 
 def clocks_of(bag: Bag) -> dict[str, Clock]:
@@ -116,7 +118,8 @@ def alternates(source: Source) -> bool:
             CYCLE.still_shaft / STREAM.zero if quantity == "position" else 0.0,
         )
         away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, coarse))
-        is_more = time[3:-1] - time[1:-3] < STREAM.changes * np.median(np.diff(time))
+        wait = time[3:-1] - time[1:-3]
+        is_more = wait < STREAM.changes / 2.0 * np.median(wait)
         if np.mean(away) > 0.5 or (quantity == "position" and np.mean(away & is_more) > STREAM.repeated / 2.0):
             return True
     return False
