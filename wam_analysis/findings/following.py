@@ -8,12 +8,12 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.force import fate_words
 from wam_analysis.findings.force_steps import UNSTABLE, force_steps, many_steps
 from wam_analysis.findings.repetition import LEAST
-from wam_analysis.foreign.pieces import rests
+from wam_analysis.foreign.pieces import resolution, rests
 from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.held_messages import value_changes
 from wam_analysis.measures.following import Following, following
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import SHAFT
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.columns import JOINT_FIELDS
 
 
@@ -27,11 +27,10 @@ def following_section(recording: AnalysedRecording) -> Section | None:
         for quantity in quantities[: 1 if one.is_joint else len(AXES)]:
             name, unit = f"{one.label} {quantity}", one.units[quantity]
             measured, wanted = one.only(quantity), command.only(quantity)
-            if rests(measured) and np.ptp(command.values[quantity]) > LEAST[unit]:
-                wrong.append(f"{name}: it was commanded to move, and never did.")
-                continue
             found, steps = _following(measured, wanted), force_steps(measured, wanted) if one.is_joint else []
             numbers, remarks = dict[str, tuple[float, str]](), list[str]()
+            if rests(measured) and _moves(measured, wanted):
+                wrong.append(f"{name}: it was commanded to move, and never did.")
             if found:
                 remarks.append(_words(found, unit))
                 numbers |= {"error, rms": (found.rms, unit), "largest error": (found.largest, unit)}
@@ -70,6 +69,14 @@ def _words(found: Following, unit: str) -> str:
     off = f", and is off by {shown(found.offset, unit)}" * (abs(found.offset) > SHAFT.agree * found.largest)
     when = f"{shown(abs(found.delay), 's')} {'after' if found.delay >= 0.0 else 'before'} its command"
     return f"follows {when}, with a gain of {shown(found.gain)}{play}{off}; {error}"
+
+
+def _moves(measured: Source, command: Source) -> bool:
+    """Whether a command moves, early enough to be followed, by more than the noise of what follows it."""
+    (value,), (sent,) = measured.values.values(), command.values.values()
+    least = max(SHAFT.joint_rest, SHAFT.far * resolution(value))
+    early = sent[command.time < measured.time[-1] - CYCLE.longest_delay]
+    return float(np.max(np.abs(early - sent[0]), initial=0.0)) > least
 
 
 def _following(measured: Source, command: Source) -> Following | None:
