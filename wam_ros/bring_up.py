@@ -246,7 +246,12 @@ class Composition(Connection):
         """Make the nodes of a configuration, those that its `shared.nodes` names, with its values."""
         with parameter_file(configuration) as file:
             own = {"cli_args": ["--ros-args", "--params-file", str(file)], "use_global_arguments": False}
-            self.make(node_makers(configuration.shared.nodes, **own), namespace, is_split)
+            try:
+                makers = node_makers(configuration.shared.nodes, **own)
+            except BaseException:
+                self.close()
+                raise
+            self.make(makers, namespace, is_split)
 
     def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> str:
         """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it.

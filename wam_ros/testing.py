@@ -100,7 +100,7 @@ class Recorded(Mapping[str, Any]):
 
 
 class RunningArm:
-    """The stack of one test.  The first use starts it; `start` starts it with other nodes or values.
+    """The stack of one test.  Its first use starts it, but for `context` and `add`; `start` with other nodes or values.
 
     Parameters
     ----------
