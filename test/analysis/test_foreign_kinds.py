@@ -311,7 +311,11 @@ def follows() -> list[Case]:
         sent = [*joint(late, late)[: len(late)], goal]
         return Case(f"a trajectory {more}", by_rosbags, sent, expected, "", NOTHING, ("/t: 1 message;",))
 
+    both = time + 4e-4 * np.random.default_rng(5).random(len(time))
+    alike = [s for topic, late in (("/js", 0.04), ("/cmd", 0.0)) for s in joints(
+        topic, both, ["a"], position=np.interp(time - late, time, path(time))[:, None])]  # fmt: skip
     return [
+        Case("by whole periods", ros1, alike, {"a position: delay": 0.04, "a position: gain": 1.0}, "", to),
         *(Case(f"a clock {by:g} s off", sqlite, [s._replace(stamp=s.stamp + by * (s.topic == topic))
                for s in joint(path(time), path(time - 0.03))], {"a position: delay": 0.03 - min(by, 0.0)}, told, to)
           for topic, by, told in (("/cmd", 0.35, "/cmd: stamps 0.35 s ahead"), ("/js", 0.6, "/js: stamps 0.6 s ahead"),
@@ -324,6 +328,7 @@ def follows() -> list[Case]:
         Case("grows", by_rosbags, joint(steps, grows), {}, "position, 0.5 rad at 7.0 s: it DIVERGES", to),
         Case("hunts", ros1, joint(steps, quick + 0.004 * np.sin(9.0 * np.maximum(time - 1.0, 0.0))),
              {"a: frequency": 4.5 / math.pi, "a: cycle, peak to peak": 0.008}, "", to),
+        Case("at its end", sqlite, joint(0.1 + 0.2 * (time > 20.99), 0.1 + 0.0 * time), {}, "", to),
         Case("does not", sqlite, joint(steps, 0.0 * steps), {}, "a position: it was commanded to move, and never", to),
         Case("a ramp", ros1, joint(ramp, np.interp(time - 0.1, time, ramp) + 0.5 * noise[:, 0]),
              {"a position: delay": 0.1}, "", to),
@@ -748,6 +753,7 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     ("time,position.a\n0,1\n", topic_map([], [], ["/a"], [], []), "titles command.position.JOINT"),
     ("time,position.a\n0,1\n", topic_map([], ["b"], [], [], []), "has no joint b; its joints: a"),
     ("time,effort.a [A]\n0,1\n", topic_map([], [], [], [], ["effort=Nm"]), "--unit gives another one for effort"),
+    ("time,position.a [mm]\n0,1\n", topic_map([], [], [], [], ["position=deg"]), "another one for position"),
     ("time,q\n0,1\n", topic_map([], [], [], ["effort=q", "position=p"], []), "no column 'p'; .* position=.*: time"),
     ("time,f\n0,1\n", topic_map([], [], [], ["force=f"], []), "no column 'f.x'; name that of force .*: time, f"),
     ("0,1\n1,1\n", NOTHING, "numbers in its first row"), ("t,q\n" + 10**6 * "1", NOTHING, "is no table: field larger"),

@@ -57,9 +57,7 @@ def ways(event: Event) -> list[str]:
 @pytest.mark.parametrize(("own", "bend", "newtons", "sd"), [
     (OWN, 0.15, 5.0, 0.0), (OWN, 0.3, 2.0, 0.0), (UNPINNED, 0.3, 2.0, 0.0), (MOTORS, 0.8, 3.0, 0.05),
 ])  # fmt: skip
-def test_what_is_advised_is_obeyed(
-    own: ForceLoopParameters, bend: float, newtons: float, sd: float, frame: str
-) -> None:
+def test_advice_is_obeyed(own: ForceLoopParameters, bend: float, newtons: float, sd: float, frame: str) -> None:
     q = bent(bend)
     force = radial(q, newtons, frame)
     refused = asked(own, q, frame, force, sd)

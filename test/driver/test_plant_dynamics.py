@@ -101,9 +101,7 @@ def stepped(frequency: np.ndarray, step: float) -> np.ndarray:
 @pytest.mark.parametrize("ratio_scale", [0.7, 1.5])
 @pytest.mark.parametrize("stiffness", [50.0, 5000.0])  # N m/rad at the joint
 @pytest.mark.parametrize("joint", [0, 3])
-def test_both_resonances_of_a_joint_of_the_arm_are_those_of_4_4(
-    ratio_scale: float, stiffness: float, joint: int
-) -> None:
+def test_both_resonances_of_a_joint_are_those_of_4_4(ratio_scale: float, stiffness: float, joint: int) -> None:
     start = (0.0, 0.3, 0.0, 0.8)
     armature = [1e8] * 4  # the others are locked
     armature[joint] = WAM.joints.armature[joint]

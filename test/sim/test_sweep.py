@@ -111,9 +111,7 @@ steps:
 
 
 @pytest.mark.slow
-def test_a_sweep_names_a_lowered_gain_and_an_uncertain_force(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_names_a_lowered_gain_and_uncertain_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """15 N along base -z, 36 deg off the normal of the link."""
     file = tmp_path / "inclined.yaml"
     file.write_text("""
