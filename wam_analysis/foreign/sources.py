@@ -119,7 +119,7 @@ def alternates(source: Source) -> bool:
         )
         away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, coarse))
         wait = time[3:-1] - time[1:-3]
-        is_more = wait < STREAM.changes / 2.0 * np.median(wait)
+        is_more = wait < (1.0 - 0.5 * STREAM.pace) * np.median(wait)
         if np.mean(away) > 0.5 or (quantity == "position" and np.mean(away & is_more) > STREAM.repeated / 2.0):
             return True
     return False
