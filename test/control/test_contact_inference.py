@@ -300,9 +300,10 @@ def test_a_push_on_the_tip_along_the_tube_is_one_at_the_elbow(q: tuple[float, ..
     assert found[0].probability < 0.95
     along = of(found, "outer_link")
     assert Reason.ALONG in along.reasons
-    assert along.is_lower_bound
-    assert (np.linalg.norm(along.force) < 1.05 * size, any(along.moment)) == (True, False)
-    assert torques(q, "outer_link", (0, 0, 0), along.force) == pytest.approx(tip, abs=0.01 * size), "and explains them"
+    assert along.is_lower_bound is (q != TIPS[1]), "there a force from the side explains them, too"
+    if along.is_lower_bound:
+        assert (np.linalg.norm(along.force) < 1.05 * size, any(along.moment)) == (True, False)
+        assert torques(q, "outer_link", (0, 0, 0), along.force) == pytest.approx(tip, abs=0.01 * size)
     blind = ContactInference(WAM, RigidBody(WAM), UNIFORM).infer(q, tip.tolist(), W)[0]
     assert blind.cover == "inner_link"
     assert blind.probability > max(0.9, found[0].probability)

@@ -46,12 +46,13 @@ class Fit(NamedTuple):
     low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
     along : probability that the force is along the tube, of a contact on this link.
     force : (2,), N, most likely components across the link at `position`.
-    force_sd : N, standard deviation of the size of the force, the position unknown.
+    force_sd : N, standard deviation of the size of the force, the position unknown, and whether it is along the tube if
+        `along` is above 0.5.
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
     torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
-        and force; infinite where they do not determine it, as of a force along the tube.
+        and force; infinite where they do not determine it.
     smallest : (3,), N, across the link and along it: the force if the position were the end of the link, the longest
-        lever; if `along` is above 0.5 the smallest one at its start that explains the torques, as one along it does.
+        lever; or where a force along the link explains more, the smallest one at its start, which explains as much.
     residual : what the best contact does not explain, chi^2.
     """
 
@@ -220,7 +221,7 @@ class ContactFit:
         """
         grams: list[Gram] = gram.tolist()
         links = [self._link(i, one) for i, one in enumerate(grams)]
-        pieces, left = self._along(grams[-1])
+        pieces, axial, left = self._along(grams[-1])
         for i, link in enumerate(links):
             pieces += self._grid(i, link)
         pieces.sort(reverse=True)
@@ -229,7 +230,7 @@ class ContactFit:
         parts, total = self._parts(pieces)
         total += math.exp(min(other - pieces[0][0], CONTACT.largest_exponent))
         each = zip(links, parts, self._ends, strict=True)
-        return [self._fit(link, part, total, ends, grams[-1], left) for link, part, ends in each]
+        return [self._fit(link, part, total, ends, axial, left, grams[-1]) for link, part, ends in each]
 
     def _link(self, i: int, gram: Gram) -> _Link:
         """A link with the tangential force in the covariance, of the size at the likeliest of some places.
@@ -275,11 +276,11 @@ class ContactFit:
         constant, width = link.constant + self._end_frequency, CONTACT.end_length
         return pieces + [(link.log_density(x) + constant, x, width, i, False) for x in self._meeting[i]]
 
-    def _along(self, gram: Gram) -> tuple[list[Piece], float]:
+    def _along(self, gram: Gram) -> tuple[list[Piece], float, float]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
-        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns what the
-        best of them does not explain, chi^2, too.
+        A force along the tube equals the same force at its start: no joint torques distinguish them.  Returns its size,
+        N, and what the best of them does not explain, chi^2, too.
         """
         scale, precision, (_, end) = self._given.force_scale, self._precision, self._ends[-1]
         r, a1, a2, b1, b2, _, axial = gram
@@ -297,14 +298,16 @@ class ContactFit:
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume - rarity
             found.append((value + frequency, x, width, len(self._ends) - 1, True))
             left = min(left, rr - ra * ra / (aa + precision))
-        return found, left
+        return found, size, left
 
-    def _at_start(self, gram: Gram) -> Triple:
-        """The smallest force at the start of the last link that explains the torques, across and along it, N."""
+    def _at_start(self, gram: Gram) -> tuple[float, Triple]:
+        """The part of r^T W r that the smallest force at the start of the last link explains, and it, see `Fit`."""
         at = (1, 2, AXIAL)
         matrix = np.array([[gram[i][j] for j in at] for i in at]) + self._precision * np.eye(3)
-        f1, f2, along = solution(matrix, np.array([gram[0][i] for i in at])).tolist()
-        return f1, f2, along
+        right = np.array([gram[0][i] for i in at])
+        force = solution(matrix, right)
+        f1, f2, along = force.tolist()
+        return float(force.dot(right)), (f1, f2, along)
 
     def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
         """What the pieces, the most probable first, are of each link, and the sum of their weights."""
@@ -331,11 +334,11 @@ class ContactFit:
                 part.low, part.high = min(low, part.low), max(high, part.high)  # in this order never a NaN
         return parts, total
 
-    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, last: Gram, left: float) -> Fit:
+    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair, axial: float, left: float, last: Gram) -> Fit:
         start, end = ends
-        is_along = part.along > 0.5 * part.mass
-        side = (part.first - part.first_along) / max(part.mass - part.along, CONTACT.negligible)
-        place = min(max(part.first_along / part.along if is_along else side, start), end)
+        is_along, rest = part.along > 0.5 * part.mass, part.mass - part.along
+        side = min(max((part.first - part.first_along) / max(rest, CONTACT.negligible), start), end)
+        place = min(max(part.first_along / part.along, start), end) if is_along else side
         variance = max(0.0, (part.second - 2.0 * place * part.first) / part.mass + place * place)
         explained, force, (s11, s12, s22) = link.force(place)
         step = 0.5 * (end - start) / self._given.positions
@@ -345,6 +348,11 @@ class ContactFit:
         u1, u2 = force[0] / size, force[1] / size
         s11, s12, s22 = s11 + d1 * d1 * variance, s12 + d1 * d2 * variance, s22 + d2 * d2 * variance
         radial = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22
+        if is_along:  # or it is across, elsewhere: the force that is likeliest here is neither
+            across = math.hypot(*link.force(side)[1])
+            radial += (part.along * (axial - size) ** 2 + rest * (across - size) ** 2) / part.mass
+        at_end, (e1, e2), _ = link.force(end)
+        at_start, smallest = self._at_start(last) if is_along else (0.0, (e1, e2, 0.0))
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22
         return Fit(
             probability=part.mass / total,
@@ -355,9 +363,9 @@ class ContactFit:
             along=part.along / part.mass,
             force=force,
             force_sd=math.sqrt(radial),
-            direction_sd=math.pi if is_along else min(math.sqrt(about) / size, math.pi),
-            torque_position_sd=math.inf if is_along else link.torque_position_sd(place, force),
-            smallest=self._at_start(last) if is_along else (*link.force(end)[1], 0.0),
+            direction_sd=min(math.sqrt(about) / size, math.pi),
+            torque_position_sd=link.torque_position_sd(place, force),
+            smallest=smallest if at_start > at_end else (e1, e2, 0.0),
             residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
 

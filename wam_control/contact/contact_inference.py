@@ -166,12 +166,12 @@ class ContactInference:
         residual = fit.residual / instants
         if cover.is_moment_only:
             reasons |= Reason.MOMENT_ONLY
-        elif is_unknown and fit.along <= 0.5:
+        elif is_unknown and not fit.smallest[2]:
             sd_of_usual = fit.torque_position_sd * math.hypot(*fit.force) / self._parameters.force_scale
             reasons |= Reason.POSE if sd_of_usual > end - start else Reason.WEAK
         if residual > self._parameters.largest_residual:
             reasons |= Reason.MORE
-        place = fit.position if not is_unknown else start if fit.along > 0.5 else end
+        place = fit.position if not is_unknown else start if fit.smallest[2] else end
         f1, f2, along = fit.smallest if is_unknown else (*fit.force, 0.0)
         share = (place - start) / (end - start)
         fx, fy, fz = [f1 * e1 + f2 * e2 + along * e3 for e1, e2, e3 in cover.ways]
