@@ -23,7 +23,7 @@ import numpy as np
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.rigid_body import Array
-from wam_description.signals import Triple
+from wam_description.signals import ZERO, Triple
 from wam_description.small_matrices import solution
 
 Pair = tuple[float, float]
@@ -51,8 +51,8 @@ class Fit(NamedTuple):
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
     torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
         and force; infinite where they do not determine it.
-    smallest : (3,), N, across the link and along it: the force if the position were the end of the link, the longest
-        lever; or where a force along the link explains more, the smallest one at its start, which explains as much.
+    is_at_start : whether the smallest force that explains the torques is at the start of the link, as for one along it.
+    smallest : (3,), N, across the link and along it: that force, at the end of the link, the longest lever, if not.
     residual : what the best contact does not explain, chi^2.
     """
 
@@ -66,6 +66,7 @@ class Fit(NamedTuple):
     force_sd: float
     direction_sd: float
     torque_position_sd: float
+    is_at_start: bool
     smallest: Triple
     residual: float
 
@@ -352,7 +353,7 @@ class ContactFit:
             across = math.hypot(*link.force(side)[1])
             radial += (part.along * (axial - size) ** 2 + rest * (across - size) ** 2) / part.mass
         at_end, (e1, e2), _ = link.force(end)
-        at_start, smallest = self._at_start(last) if is_along else (0.0, (e1, e2, 0.0))
+        at_start, from_start = self._at_start(last) if is_along else (0.0, ZERO)
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22
         return Fit(
             probability=part.mass / total,
@@ -365,7 +366,8 @@ class ContactFit:
             force_sd=math.sqrt(radial),
             direction_sd=min(math.sqrt(about) / size, math.pi),
             torque_position_sd=link.torque_position_sd(place, force),
-            smallest=smallest if at_start > at_end else (e1, e2, 0.0),
+            is_at_start=at_start > at_end,
+            smallest=from_start if at_start > at_end else (e1, e2, 0.0),
             residual=max(0.0, left if is_along else link.gram[0][0] - explained - link.precision * size * size),
         )
 

@@ -166,13 +166,14 @@ class ContactInference:
         residual = fit.residual / instants
         if cover.is_moment_only:
             reasons |= Reason.MOMENT_ONLY
-        elif is_unknown and not fit.smallest[2]:
+        elif is_unknown and not fit.is_at_start:
             sd_of_usual = fit.torque_position_sd * math.hypot(*fit.force) / self._parameters.force_scale
             reasons |= Reason.POSE if sd_of_usual > end - start else Reason.WEAK
         if residual > self._parameters.largest_residual:
             reasons |= Reason.MORE
-        place = fit.position if not is_unknown else start if fit.smallest[2] else end
-        f1, f2, along = fit.smallest if is_unknown else (*fit.force, 0.0)
+        place, (f1, f2, along) = fit.position, (*fit.force, 0.0)
+        if is_unknown:
+            place, (f1, f2, along) = start if fit.is_at_start else end, fit.smallest
         share = (place - start) / (end - start)
         fx, fy, fz = [f1 * e1 + f2 * e2 + along * e3 for e1, e2, e3 in cover.ways]
         point = [first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)]
