@@ -101,6 +101,11 @@ class Source(NamedTuple):
         """The source with other values of some quantities, and what was done to them."""
         return self._replace(values=self.values | dict(values), treated=(*self.treated, treated))
 
+    def since(self, first: float) -> "Source":
+        """The source with times, s, from another instant on."""
+        time, sent, received, away = (each - first for each in (self.time, self.sent, self.received, self.away))
+        return self._replace(time=time, sent=sent, received=received, away=away)
+
     def without(self, quantity: str, treated: Treated) -> "Source":
         """The source without a quantity, and why."""
         return self._replace(

@@ -55,8 +55,7 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 if np.count_nonzero(known[rows]) >= (1 if is_command else SHAFT.fewest_samples):
                     found.append(treated_source(source))
     first = min((one.sent[0] for one in found), default=0.0)  # times of reception may be later than a coarse stamp
-    since = {name: [getattr(one, name) - first for one in found] for name in ("time", "sent", "received", "away")}
-    return _labelled([one._replace(**{name: times[i] for name, times in since.items()}) for i, one in enumerate(found)])
+    return _labelled([one.since(first) for one in found])
 
 
 def clocks_of(bag: Bag) -> dict[str, Clock]:
@@ -103,7 +102,8 @@ def alternates(source: Source) -> bool:
     Messages of another publisher come in addition; single wrong values are in the place of right ones.
     """
     for quantity in source.values:
-        time, values = (one := source.only(quantity)).time, one.values[quantity]
+        one = source.only(quantity)
+        time, values = one.time, one.values[quantity]
         if len(values) < SHAFT.fewest_samples:
             continue
         before, last, here, then, after = sliding_window_view(values, 5).T
