@@ -128,13 +128,15 @@ def _fields(kind: str, messages: Sequence[Any], given: TopicMap) -> Iterable[tup
     own = [one for one in known if one[1].keys() - {"name"}]
     mapped = {q: path for q, path in given.fields.items() if all(_has(messages, part) for part in path.split(","))}
     sent = {q.removeprefix(COMMANDED): mapped.pop(q) for q in [*mapped] if q.startswith(COMMANDED)}
-    if not own:
-        own = [("", mapped)] * (not sent or not mapped.keys() <= {"name", "stamp"})
-    elif mapped:
+    if own and mapped:
         (suffix, first), *_ = own
         own = [(suffix, first | {q: path for q, path in mapped.items() if q in (*first, "stamp")})]
-    for_all = own[0][1] if own else mapped
-    return [*own, (SENT, {q: path for q, path in for_all.items() if q in ("name", "stamp")} | sent)] if sent else own
+    elif not own and (mapped.keys() - {"name", "stamp"} or not sent):  # a message may hold a command alone
+        own = [("", mapped)]
+    if not sent:
+        return own
+    _, shared = own[0] if own else ("", mapped)
+    return [*own, (SENT, {q: path for q, path in shared.items() if q in ("name", "stamp")} | sent)]
 
 
 def _has(messages: Iterable[Any], path: str) -> bool:
