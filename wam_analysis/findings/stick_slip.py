@@ -103,13 +103,14 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     begins: list[float] = []
     placed = source.only("position")
     positions = placed.values.get("position", np.zeros(0))
-    hidden = resolution(positions) * (SHAFT.noisy if "velocity" in source.values else SHAFT.stays)  # by noise
+    has_velocity = "velocity" in source.values
+    hidden = resolution(positions) * (SHAFT.noisy if has_velocity else SHAFT.stays)  # by noise
     moving = [q for q in ("velocity", "position") if q in source.values]
     moved = max(moving, key=lambda q: np.count_nonzero(np.isfinite(source.values[q])), default="")
     for piece in pieces(source, moved) if moved else ():
-        rest, velocity = rest_speed(piece, least), piece.values["velocity"]
-        least_rows = max(1, round(SHAFT.shortest_phase / piece.period))
-        if "velocity" in source.values:
+        velocity = piece.values["velocity"]
+        if has_velocity:
+            rest, least_rows = rest_speed(piece, least), max(1, round(SHAFT.shortest_phase / piece.period))
             still = at_rest(velocity, rest, least_rows)
         else:
             still, rest, least_rows = _staying(piece, least)

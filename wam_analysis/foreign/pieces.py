@@ -135,10 +135,7 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
     for piece in pieces(shown) if has_both else ():
         width = max(1, round(STREAM.averaged / piece.period))
         while len(piece.time) > width + 1:
-            span, least = (
-                width * piece.period,
-                SHAFT.noisy * resolution(piece.recorded["position"]),
-            )
+            span, least = width * piece.period, SHAFT.noisy * resolution(piece.recorded["position"])
             way, by = ways(piece, width)
             if np.max(np.abs(way)) > 2.0 * least:
                 rate = way / span

@@ -49,7 +49,7 @@ def _without_wraps(one: Source) -> Source:
 def _without_spikes(one: Source) -> Source:
     """A source without single samples that are away from those before and after."""
     at, moves = _jumps(one, STREAM.spikes)
-    before, here, after, then = sliding_window_view(np.pad(moves, (1, 2)), len(moves))[:4]
+    before, here, after, then = sliding_window_view(np.pad(moves, (1, 2)), len(moves))
     back = at[(here * after < 0.0) & (before == 0.0) & (then == 0.0)]
     for quantity, value in one.values.items():
         # a zero that would move and move back is a single sample, too

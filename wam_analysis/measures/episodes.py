@@ -81,10 +81,10 @@ def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
                 better = max(filter(None, both), key=lambda one: one.confidence, default=None)
                 slower = np.max(longest[first:last] % n) / CYCLE.slowest_cycles  # lag of one that is there, or 0
                 is_shape = last - first < slower or abs(2.0 * lag - slower) < CYCLE.same_period * slower
-                goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
                 changing = None if better or is_shape else _changing(time[inner], flat[inner], cycle.period)
                 if better or is_shape or changing:
                     break
+            goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
             if is_shape or goes_on or changing:
                 if changing and changing.growth > 1.0 and changing.cycles >= CYCLE.episode_cycles:
                     found.append(Episode(float(time[first]), float(time[last - 1]), changing))
