@@ -40,13 +40,13 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
         raise BagError(f"{directory} has no bag of {', '.join(missing)}; run 'wam experiment {experiment.name}'")
     recordings = {name: recording(bag) for name, bag in bags.items()}
     for run in experiment.runs:
+        _require_own(experiment, run, recordings[run.name])
         _require_whole(experiment, run, recordings[run.name])
     return _evaluate(experiment, recordings)
 
 
 def _require_whole(experiment: Experiment, run: Run, recorded: Recording) -> None:
     """Refuse a run that was interrupted, unless the driver is expected to stop it."""
-    _require_own(experiment, run, recorded)
     names = [str(step["name"]) for step in run.steps]
     if (recorded.outcome == Code.DONE and len(recorded.steps) >= len(names)) or (run.stops and recorded.fault):
         return
