@@ -497,10 +497,10 @@ class RunningArm:
         return self._composition is not None and bool(self._composition.nodes)
 
     def _require_start(self) -> Composition:
+        made = self._connected()
         if not self._is_started:
-            self._connected()
             self.start()
-        return self._connected()
+        return made
 
 
 def _source(condition: Callable[[], Any]) -> str:
