@@ -13,7 +13,8 @@ from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import HYPOTHESIS, NAN, ForceSignal, Traces, most_probable
 from wam_bag.arrays import Mask, Numbers, Texts, Times
 from wam_description.event_text import REASONS
-from wam_sim.recorded_run import RecordedRun, RecordedStep
+from wam_sim.reactions import RecordedStep
+from wam_sim.recorded_run import RecordedRun
 
 NO_LINK = "none"
 NOT_CERTAIN = "The uncertainty of contacts is not known: contact/hypotheses was not recorded."

@@ -14,7 +14,6 @@ from wam_bag.bag import BagError, JointColumns
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.arm import Arm, InputAges
 from wam_description.transmission_map import TransmissionMap
-from wam_sim.reactions import StepSpan
 from wam_sim.recorded_commands import COMMANDS
 from wam_sim.recorded_run import RecordedRun
 
@@ -100,7 +99,7 @@ def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, Numbers] | None:
     return None
 
 
-def step_at(steps: Sequence[StepSpan], stamp: int) -> str:
+def step_at(steps: Sequence[Any], stamp: int) -> str:
     """Name of the step of a scenario, or of the force, at an instant, '' outside."""
     return next((step.name for step in steps if step.begin <= stamp < step.end), "")
 

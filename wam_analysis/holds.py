@@ -16,8 +16,8 @@ from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import ForceCommand
-from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
-from wam_sim.recorded_run import RecordedRun, RecordedStep
+from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, RecordedStep, of_force_loop, within
+from wam_sim.recorded_run import RecordedRun
 from wam_sim.replay import tables
 
 RecordedTask = tuple[TaskCommand, int, int]  # with begin and end, ns

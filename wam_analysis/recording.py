@@ -23,8 +23,8 @@ from wam_bag.losses import CUT
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.status import diagnosed_name
-from wam_sim.reactions import SETTLING_TIME, RecordedReaction, too_short, unassessed, watched_times
-from wam_sim.recorded_run import RecordedStep, messages_of, recorded_run, status_of
+from wam_sim.reactions import SETTLING_TIME, RecordedReaction, RecordedStep, too_short, unassessed, watched_times
+from wam_sim.recorded_run import messages_of, recorded_run, status_of
 
 STAMPED = (JointColumns, WrenchColumns, PointColumns)
 MOVING = ("motor_states", "joint_sensors", "joint_states", "sim/joint_states")  # where motion is seen, the best first
@@ -160,7 +160,8 @@ class AnalysedRecording:
     def mode(self) -> str:
         """'lockstep', 'realtime' or 'unknown'."""
         is_timed = any(RATE in facts for facts in self.loop)
-        return "realtime" if self.run.mode == "unknown" and is_timed else self.run.mode
+        mode = self.run.bag.mode
+        return "realtime" if mode == "unknown" and is_timed else mode
 
     @property
     def lost(self) -> list[str]:

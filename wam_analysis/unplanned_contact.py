@@ -11,8 +11,9 @@ from wam_analysis.traces import NAN, Traces
 from wam_bag.arrays import Mask
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.number_text import apart
+from wam_sim.reactions import RecordedStep
 from wam_sim.recorded_commands import COMMANDS
-from wam_sim.recorded_run import RecordedRun, RecordedStep
+from wam_sim.recorded_run import RecordedRun
 
 LIMIT = "limits.contact_force"
 

@@ -1,17 +1,17 @@
 """Declared nodes on the topics of a simulation or a replay, and the numbers of their messages."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 from struct import Struct
 from typing import Any, NamedTuple
 
 from wam_description.defects import Check
-from wam_description.interface import Feed, is_packaged
+from wam_description.interface import Feed, Interface, is_packaged
 from wam_description.message_bus import MessageBus, Publish, Take
 from wam_description.signals import mask
-from wam_description.synchroniser import Inlet, OutOfTime
+from wam_description.synchroniser import Inlet, OutOfTime, Synchroniser
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
-from wam_description.wiring import Declaration, Outputs
+from wam_description.wiring import Declaration, Inputs, Outputs
 
 
 class TopicValue(NamedTuple):
@@ -23,6 +23,7 @@ class TopicValue(NamedTuple):
 
 
 Rows = dict[str, list[TopicValue]]
+Work = Callable[[Inputs], Outputs]
 
 
 class NodeBus(MessageBus):
@@ -30,28 +31,36 @@ class NodeBus(MessageBus):
 
     Parameters
     ----------
-    topics : those that exist, by name.
+    interface : of the nodes.
+    kept : topics whose numbers are kept.
     """
 
-    def __init__(self, topics: Mapping[str, Topic]) -> None:
+    def __init__(self, interface: Interface, kept: Iterable[str]) -> None:
         super().__init__()
-        self._kept = {name: _Kept(_ROWS[topic.type]) for name, topic in topics.items() if topic.type in _ROWS}
-        for name, kept in self._kept.items():
-            self.listen(name, kept.add)
+        self._interface = interface
+        topics = [interface.topics[name] for name in kept if name in interface.topics]
+        self._kept = {topic.name: _Kept(_ROWS[topic.type]) for topic in topics if topic.type in _ROWS}
+        for name, numbers in self._kept.items():
+            self.listen(name, numbers.add)
         self._rows: Rows = {}
         self._outlets: dict[str, _Outlets] = {}  # by node
 
     def connect(
-        self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
-    ) -> None:
+        self, declaration: Declaration, node: Any, around: Callable[[Work], Work] = lambda work: work
+    ) -> set[Synchroniser]:
         """Connect the reactions of a node; when several take one topic, all work before the first publishes.
 
         Parameters
         ----------
-        declaration : of the node.
-        feeds : its reactions to each topic.
-        checks : what each output goes through, by topic; see `output_check`.
+        declaration, node : of what is connected.
+        around : makes what works in place of a step.
+
+        Returns
+        -------
+        set
+            the synchronisers of the node.
         """
+        feeds, checks = self._interface.feeds(declaration, node), self._interface.checks(declaration)
         outlets = self._outlets[declaration.name] = _Outlets(declaration)
         for name in declaration.outputs:
             outlets[name] = _checked(self.publisher(name), checks.get(name))
@@ -60,8 +69,9 @@ class NodeBus(MessageBus):
         # a node of the stack reads what it declares, as the same bits over topics show: it needs no mask
         is_masked = not is_packaged(declaration)
         for topic, found in feeds.items():
-            reactions = [(_inlet(feed, topic, is_masked), feed.work) for feed in found]
+            reactions = [(_inlet(feed, topic, is_masked), around(feed.work)) for feed in found]
             self.listen(topic, _taker(reactions, outlets))
+        return {feed.synchroniser for found in feeds.values() for feed in found}
 
     def publish_of(self, node: str, stamp: int, outputs: Outputs) -> None:
         """Publish what a connected node returned elsewhere than in a step, as its steps' outputs are published."""
@@ -149,7 +159,7 @@ def _checked(publish: Publish, check: Check | None) -> Publish:
     return publish if check is None else lambda stamp, value: publish(stamp, check(value))
 
 
-def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets: _Outlets) -> Take:
+def _taker(reactions: Sequence[tuple[Inlet, Work]], outlets: _Outlets) -> Take:
     """What hands a message to the reactions of a node, and publishes what they answer when all have worked.
 
     One whose newest state is too old refuses it, as over topics; the driver brakes then and names the node.

@@ -1,11 +1,10 @@
 """What the force loop did instead of what was commanded, when and why; whether a step's command was met in the end."""
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from wam_control.force.task import AxisKind, TaskCommand, watched_axes
-from wam_control.task.scenario import ScenarioStep
 from wam_description.event import Code, Event
 from wam_description.event_text import sentence
 
@@ -54,36 +53,13 @@ class RecordedReaction(NamedTuple):
         return TOO_MUCH if self.name is Code.PUSHED else UNREACHED
 
 
-class StepSpan(Protocol):
-    """A step of a scenario that was played, recorded or not."""
+class RecordedStep(NamedTuple):
+    """A step of the scenario: begin and end in ns, with the live parameters that it set, by 'node:parameter'."""
 
-    @property
-    def name(self) -> str:
-        """Name of the step."""
-
-    @property
-    def begin(self) -> int:
-        """When it began, ns."""
-
-    @property
-    def end(self) -> int:
-        """When it ended, ns."""
-
-
-Step = TypeVar("Step", bound=StepSpan)
-
-
-class PlayedStep(NamedTuple):
-    """A step of a scenario that is at hand, and when it was played, ns."""
-
-    step: ScenarioStep
+    name: str
     begin: int
     end: int
-
-    @property
-    def name(self) -> str:
-        """Name of the step."""
-        return self.step.name
+    settings: Mapping[str, Any] = {}
 
 
 def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple[RecordedReaction, ...]:
@@ -102,17 +78,17 @@ def duration(reactions: Iterable[RecordedReaction]) -> float:
     return sum(one.end - one.begin for one in reactions) / 1e9
 
 
-def steady_begin(step: StepSpan) -> int:
-    """When what is taken as the steady state of a step begins, ns."""
-    return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
+def steady_begin(begin: int, end: int) -> int:
+    """When what is taken as the steady state of a time begins, ns."""
+    return max(end - round(STEADY * 1e9), (begin + end) // 2)
 
 
-def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[RecordedReaction]:
+def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[RecordedReaction]:
     """Why what a step commands is not met, nothing where it is.
 
     Refused in its steady state, with more force than allowed in all of it, not reached at its end, a posture too fast.
     """
-    steady = steady_begin(step)
+    steady = steady_begin(step.begin, step.end)
     found = within(reactions, steady, step.end)
     refused = [one for one in of_force_loop(found) if one.holds]
     at_end = [one for one in found if one.end >= step.end - BRIEF]
@@ -120,16 +96,6 @@ def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[Recorde
     missed = [one for one in at_end if one.name is Code.NOT_REACHED]
     late = [one for one in within(reactions, step.begin, step.end) if one.event.cause == "speed"]
     return [*refused[:1], *hard[:1], *missed[:1], *late[:1]]
-
-
-def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[PlayedStep]) -> list[str]:
-    """A sentence for each reason why what a step commands is not met."""
-    return [
-        f"{one.name} {why.outcome}: {why.reason}"
-        for one in played
-        if one.step.commands_arm
-        for why in unmet(reactions, one)
-    ]
 
 
 def watched_times(tasks: Iterable[tuple[TaskCommand | None, int, int]]) -> list[tuple[int, int]]:
@@ -147,7 +113,7 @@ def watched_times(tasks: Iterable[tuple[TaskCommand | None, int, int]]) -> list[
     return [(begin, end) for axes, begin, end in times if axes]
 
 
-def is_too_short(times: Sequence[tuple[int, int]], step: StepSpan, settling_time: float) -> bool:
+def is_too_short(times: Sequence[tuple[int, int]], step: RecordedStep, settling_time: float) -> bool:
     """Whether the task of a step commands an axis for too brief a time to be assessed at its end.
 
     Parameters
@@ -162,9 +128,9 @@ def is_too_short(times: Sequence[tuple[int, int]], step: StepSpan, settling_time
 def unassessed(
     reactions: Sequence[RecordedReaction],
     times: Sequence[tuple[int, int]],
-    steps: Sequence[Step],
+    steps: Sequence[RecordedStep],
     settling_times: Sequence[tuple[int, float]],
-) -> list[Step]:
+) -> list[RecordedStep]:
     """The steps of whose command nothing is reported because it lasts too briefly; arguments as of `is_too_short`.
 
     `settling_times`: since when, ns, the force loop has each, s, in order of time.
@@ -176,14 +142,14 @@ def unassessed(
     ]
 
 
-def settling_time_in(settling_times: Sequence[tuple[int, float]], step: StepSpan) -> float:
+def settling_time_in(settling_times: Sequence[tuple[int, float]], step: RecordedStep) -> float:
     """The largest settling time, s, that was in force during a step; NaN where it is not known."""
     before = [seconds for since, seconds in settling_times if since <= step.begin]
     during = [seconds for since, seconds in settling_times if step.begin < since < step.end]
     return max([*before[-1:], *during], default=math.nan)
 
 
-def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[StepSpan]) -> str:
+def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[RecordedStep]) -> str:
     """What `unassessed` means of the steps that it gives, in words."""
     values = dict.fromkeys(settling_time_in(settling_times, one) for one in steps)
     limit = f"{' or '.join(f'{seconds:g}' for seconds in values)} s ({SETTLING_TIME})"

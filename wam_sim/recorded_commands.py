@@ -36,13 +36,6 @@ class RefusedCommands(NamedTuple):
         return f"{many} of {self.topic} with {self.defect}: the stack refused them, they are left out"
 
 
-class TakenCommands(NamedTuple):
-    """A bag with the commands that the stack took, and those that it refused."""
-
-    bag: Bag
-    refused: tuple[RefusedCommands, ...]
-
-
 def states_of(bag: Bag, namespace: str) -> tuple[str, JointColumns] | None:
     """The topic whose stamps are the arm's clock and its messages, None if no state was recorded."""
     for name in STATES:
@@ -83,8 +76,8 @@ def several_runs(bag: Bag, namespace: str) -> str:
     return ""
 
 
-def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> TakenCommands:
-    """The commands of a bag as the stack took them.
+def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> tuple[Bag, tuple[RefusedCommands, ...]]:
+    """A bag with the commands that the stack took, and those that it refused.
 
     A command without a stamp has that of the newest state that was logged before it, as has a push by the wall clock.
     Commands are left out which are far ahead of every state of the recording, or in a frame that the arm does not have.
@@ -118,7 +111,7 @@ def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> 
         topics[topic] = columns if np.all(kept) else _only(columns, kept)
     changed = any(columns is not bag.topics[topic] for topic, columns in topics.items())
     taken = bag._replace(topics=type(bag.topics)(topics)) if changed else bag
-    return TakenCommands(taken, tuple(one for one in refused if one.number))
+    return taken, tuple(one for one in refused if one.number)
 
 
 def _frames(parameters: RecordedParameters) -> tuple[str, ...]:

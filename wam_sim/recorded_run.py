@@ -1,15 +1,13 @@
 """Contents of a bag as a run: arm, parameters, steps, faults, status and mode; the one reader of all these."""
 
-import json
+import ast
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-import yaml
 
-from wam_bag import safe_yaml
 from wam_bag.arrays import Mask, Times
 from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_control.task.scenario import FORCE_LOOP
@@ -17,20 +15,11 @@ from wam_description.event import Code
 from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, ENABLED, parse
 from wam_description.topics import TOPICS
-from wam_sim.reactions import RecordedReaction, lasting
+from wam_sim.reactions import RecordedReaction, RecordedStep, lasting
 from wam_sim.recorded_commands import RefusedCommands, several_runs, taken_commands
-from wam_sim.recorded_parameters import LARGEST, RecordedParameters, recorded_parameters
+from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters
 
 Kind = TypeVar("Kind", JointColumns, WrenchColumns, PointColumns, TableColumns)
-
-
-class RecordedStep(NamedTuple):
-    """A step of the scenario: begin and end in ns, with the live parameters that it set, by 'node:parameter'."""
-
-    name: str
-    begin: int
-    end: int
-    settings: Mapping[str, Any]
 
 
 class RecordedFault(NamedTuple):
@@ -52,8 +41,6 @@ class RecordedRun(NamedTuple):
     statuses : in the order of the bag.
     begun : the steps of the scenario; a recording without an outcome ended in the last one.
     outcome : `Code.DONE`, why the scenario failed, or '' if the recording ended before.
-    faults : of the driver, each once.
-    mode : 'lockstep', 'realtime' or 'unknown'.
     refused : commands that are left out of the bag.
     """
 
@@ -64,12 +51,16 @@ class RecordedRun(NamedTuple):
     statuses: tuple[NodeStatus, ...]
     begun: tuple[RecordedStep, ...]
     outcome: str
-    faults: tuple[RecordedFault, ...]
-    mode: str
-    refused: tuple[RefusedCommands, ...] = ()
+    refused: tuple[RefusedCommands, ...]
 
     def __repr__(self) -> str:
-        return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r}, {self.mode})"
+        return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r})"
+
+    @property
+    def faults(self) -> tuple[RecordedFault, ...]:
+        """Those of the driver, each once."""
+        found = (RecordedFault(one.stamp, one.fault) for one in self.statuses if one.node == "driver" and one.fault)
+        return tuple(dict.fromkeys(found))
 
     @property
     def steps(self) -> tuple[RecordedStep, ...]:
@@ -86,7 +77,7 @@ class RecordedRun(NamedTuple):
         try:
             has_own = not self.parameters.shared.is_simulated
         except BagError:
-            has_own = self.mode != "lockstep"
+            has_own = self.bag.mode != "lockstep"
         return not has_own or any(name.startswith(f"{self.namespace}/sim/") for name in topics)
 
     @property
@@ -220,18 +211,7 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
     bag, refused = taken_commands(bag, namespace, parameters)
     commands = bag.topics.get(f"{namespace}/force_command")
     last = int(commands.stamp_ns[-1]) if isinstance(commands, WrenchColumns) and len(commands.stamp_ns) else 0
-    faults = dict.fromkeys(RecordedFault(s.stamp, s.fault) for s in statuses if s.node == "driver" and s.fault)
-    return RecordedRun(
-        bag,
-        namespace,
-        arms,
-        parameters,
-        statuses,
-        *_steps(statuses, last),
-        tuple(faults),
-        bag.mode,
-        refused,
-    )
+    return RecordedRun(bag, namespace, arms, parameters, statuses, *_steps(statuses, last), refused)
 
 
 def namespaces(bag: Bag) -> tuple[str, tuple[str, ...]]:
@@ -289,12 +269,8 @@ def _settings(status: NodeStatus) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
+    """A value from its text in Python; any other text is a word."""
     try:
-        return json.loads(text)  # YAML takes 1e-05 for a word
-    except (ValueError, RecursionError):
-        pass
-    try:
-        found = safe_yaml.load(text, LARGEST)
-    except (yaml.YAMLError, ValueError):
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
         return text
-    return text if isinstance(found, bool) and text not in ("True", "False") else found  # 'off' is a word

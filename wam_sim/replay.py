@@ -8,7 +8,7 @@ Topics of numbers are compared; in_contact and markers follow from the same esti
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
@@ -26,7 +26,7 @@ from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Inputs, Outputs
-from wam_sim.bus import NodeBus, Rows, TopicValue, flat
+from wam_sim.bus import NodeBus, Rows, TopicValue, Work, flat
 from wam_sim.recorded_run import RecordedRun, recorded_run
 
 # fields of messages with three axes, and their units
@@ -153,7 +153,7 @@ def replay(
             f"{path}: {declaration.name} publishes nothing from these inputs, and the bag has no message of it: "
             "there is nothing to compare; give a bag with all topics, from the recorder of the stack"
         )
-    mode = shared.timing.mode if run.mode == "unknown" else run.mode
+    mode = shared.timing.mode if bag.mode == "unknown" else bag.mode
     lost = bag.losses.sentences(bag.first)
     changed = _changed_values(run, declaration, shared, own) if configuration else ()
     return Replay(declaration.name, mode, tuple(compared), tuple(lost), changed, run.others)
@@ -216,7 +216,7 @@ def _run(run: RecordedRun, shared: Shared, declaration: Declaration, own: Any) -
         if item.age == "command" and run.columns(item.topic) is None:
             interface.topics.pop(item.topic, None)  # the scenario that was recorded did not have this command
 
-    def changing(work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
+    def changing(work: Work) -> Work:
         def step(inputs: Inputs) -> Outputs:
             while changes and changes[0][0] < inputs.stamp:
                 node.tune(changes.pop(0)[1])
@@ -224,13 +224,10 @@ def _run(run: RecordedRun, shared: Shared, declaration: Declaration, own: Any) -
 
         return step
 
-    feeds = {
-        topic: [feed._replace(work=changing(feed.work)) for feed in found]
-        for topic, found in interface.feeds(declaration, node).items()
-    }
-    bus = NodeBus({name: interface.topics[name] for name in declaration.outputs if name in interface.topics})
-    bus.connect(declaration, feeds, interface.checks(declaration))
-    recorded = [interface.topics[topic] for topic in feeds if topic not in declaration.outputs]
+    bus = NodeBus(interface, declaration.outputs)
+    bus.connect(declaration, node, changing)
+    taken = [topic for topic in declaration.inputs if topic in interface.topics and topic not in declaration.outputs]
+    recorded = [interface.topics[topic] for topic in taken]
     publishers = {topic.name: bus.publisher(topic.name) for topic in recorded}
     for _, topic, stamp, value in _messages(run, recorded, shared):
         publishers[topic](stamp, value)

@@ -62,10 +62,8 @@ def record(
         recording = _Recording(bag, simulation)
         simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), SCENARIO)
         bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration).encode())
-        recording.watch_driver()
         while not is_stopped() and not simulation.step():
-            recording.watch_driver()
-        recording.watch_driver()
+            pass
         bag.metadata(RECORDING, recording.counts())
     failure: str = simulation.scenario.failure
     return failure
@@ -78,7 +76,6 @@ class _Recording:
         shared = simulation.configuration.shared
         self._bag, self._simulation, self._arm = bag, simulation, shared.arm
         self._counts: Counter[tuple[str, str]] = Counter()
-        self._driver: NodeStatus | None = None
         interface = Interface(shared)
         for topic in interface.topics.values():
             encode = encoder(topic.type, owners(topic, shared.arm), topic.columns)
@@ -88,17 +85,9 @@ class _Recording:
                     simulation.listen(topic.name, partial(self._write_value, topic.name, encode, senders[0]))
         self._status = interface.topics[STATUS]
         bag.add_topic(self._full(STATUS), self._status.type, offered(self._status.depth, self._status.latched))
-        for node in simulation.nodes:
+        for node in ("driver", *simulation.nodes):
             simulation.listen(STATUS, partial(self._write_status, node), node)
         self._write(DESCRIPTION, encoded(interface.topics[DESCRIPTION].type, [urdf(shared.arm)]), 0, "driver")
-
-    def watch_driver(self) -> None:
-        """Record the driver's status where it has changed."""
-        status = self._simulation.driver_status
-        if status != self._driver:
-            self._driver = status
-            stamp = self._simulation.driver.stamp
-            self._write_status("driver", stamp, status._replace(stamp=stamp))
 
     def counts(self) -> dict[str, str]:
         """The record of what is in the bag: everything."""

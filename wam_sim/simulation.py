@@ -6,7 +6,8 @@ topic goes through the input synchroniser of every reaction that takes it.
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from wam_control.contact.contact_estimator import ContactEstimate
@@ -25,8 +26,8 @@ from wam_description.wiring import Call, Declaration, Inputs, Outputs, SetParame
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import unpublished
 from wam_driver.safety import Mode
-from wam_sim.bus import NodeBus, Rows, of_node
-from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
+from wam_sim.bus import NodeBus, Rows, Work, of_node
+from wam_sim.reactions import RecordedReaction, RecordedStep, lasting, unmet
 
 SCENARIO = "scenario"
 WITHOUT_EFFECT = frozenset(  # in a direct run: it is in lockstep, as fast as it can, and no node is a process
@@ -71,11 +72,12 @@ class Simulation:
         own = dict(controllers or {})
         self._interface = Interface(shared, own)
         self._settings = {name: dict(flat) for name, flat in configuration.sections.items()}
-        self._bus = NodeBus(self._interface.topics)
+        self._bus = NodeBus(self._interface, self._interface.topics)
         self._bus.listen("motor_current_command", self._command)
         self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
         self._publishers = {topic: self._bus.publisher(topic) for topic in self._interface.topics}
         self._publish_states = self._publishers["motor_states"]
+        self._publish_status = self._bus.publisher(of_node("driver", STATUS))
         self._currents: tuple[int, list[float]] = (0, [])
         self._reported: tuple[Mode, tuple[Event, ...]] | None = None
         self._warned: dict[str, set[tuple[Any, ...]]] = {}  # of each node, what its last status was about
@@ -102,11 +104,7 @@ class Simulation:
         name, kind, given = declaration.name, declaration.parameter_class, self.configuration
         own = given.node(name, kind) if name in given.sections else build(kind, {})
         node = self.nodes[name] = declaration.make(given.shared, own, *more)
-        feeds = self._interface.feeds(declaration, node)
-        self._synchronisers[name] = {feed.synchroniser for found in feeds.values() for feed in found}
-        if hasattr(node, "requests"):
-            feeds = {t: [feed._replace(work=self._requesting(node, feed.work)) for feed in feeds[t]] for t in feeds}
-        self._bus.connect(declaration, feeds, self._interface.checks(declaration))
+        self._synchronisers[name] = self._bus.connect(declaration, node, partial(self._requesting, node))
         self.listen(STATUS, lambda _, status: self._warn(name, status), name)
 
     def _warn(self, node: str, status: NodeStatus) -> None:
@@ -114,8 +112,10 @@ class Simulation:
         if status.level is Level.WARN and not status.subjects <= known:
             logging.getLogger("wam_sim").warning("warning: %s: %s", node, news(status, known))
 
-    def _requesting(self, node: Any, work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
+    def _requesting(self, node: Any, work: Work) -> Work:
         """The step of a node together with its requests to others."""
+        if not hasattr(node, "requests"):
+            return work
 
         def step(inputs: Inputs) -> Outputs:
             outputs = work(inputs)
@@ -139,15 +139,18 @@ class Simulation:
         return lasting(self._events, self.driver.stamp)
 
     @property
-    def played(self) -> list[PlayedStep]:
+    def played(self) -> list[RecordedStep]:
         """The steps that have begun so far, and when."""
         times = zip(self.steps, self._begins, [*self._begins[1:], self.driver.stamp], strict=False)
-        return [PlayedStep(*one) for one in times]
+        return [RecordedStep(step.name, begin, end) for step, begin, end in times]
 
     @property
     def unmet(self) -> str:
         """Which steps were played and yet not carried out, and why; '' where all were."""
-        return "; ".join(unmet_in_words(self.reactions, self.played))
+        played = zip(self.steps, self.played, strict=False)
+        commanding = [one for step, one in played if step.commands_arm]
+        found = [(one.name, why) for one in commanding for why in unmet(self.reactions, one)]
+        return "; ".join(f"{name} {why.outcome}: {why.reason}" for name, why in found)
 
     @property
     def scenario(self) -> Any:
@@ -159,14 +162,6 @@ class Simulation:
         """The newest estimate of the contact estimator, in full."""
         found: ContactEstimate = self.nodes["contact_estimator"].estimate
         return found
-
-    @property
-    def driver_status(self) -> NodeStatus:
-        """What the driver reports of itself."""
-        safety = self.driver.safety
-        level = Level.ERROR if safety.fault else Level.OK
-        message = f"{safety.mode.value}: {safety.fault}".removesuffix(": ")
-        return NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault, events=safety.events)
 
     def listen(self, topic: str, take: Take, node: str = "") -> None:
         """Call a function with stamp, ns, and value of each message of a topic; of one that all publish, of a node."""
@@ -187,6 +182,7 @@ class Simulation:
     def step(self) -> bool:
         """One inner period; True where the scenario is over."""
         driver, stamp = self.driver, self.driver.stamp
+        self._report(stamp)
         if driver.is_outer:
             for topic, value in driver.outer_values().items():
                 self._publishers[topic](stamp, value)
@@ -199,8 +195,6 @@ class Simulation:
             self._require_progress(stamp)
         driver.command(*self._currents)
         driver.advance(0.0)
-        if (driver.safety.mode, driver.safety.events) != self._reported:
-            self._report()
         return False
 
     def _require_progress(self, stamp: int) -> None:
@@ -262,10 +256,15 @@ class Simulation:
         """Topics that a node lacks for the present state."""
         return {topic for one in self._synchronisers[name] for topic in one.awaited(self.driver.stamp)}
 
-    def _report(self) -> None:
-        """Report a new mode or fault of the driver to every node that takes status."""
-        self._reported = self.driver.safety.mode, self.driver.safety.events
-        status = self.driver_status
+    def _report(self, stamp: int) -> None:
+        """Report a new mode or fault of the driver to every node that takes status, then to who listens."""
+        mode, events = present = self.driver.safety.mode, self.driver.safety.events
+        if present == self._reported:
+            return
+        self._reported, fault = present, self.driver.safety.fault
+        level, message = (Level.ERROR, f"{mode.value}: {fault}") if fault else (Level.OK, mode.value)
+        status = NodeStatus(level, message, "driver", mode=mode.value, fault=fault, stamp=stamp, events=events)
         for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):
-                self._bus.publish_of(node_name, status.stamp, node.take_status(status) or {})
+                self._bus.publish_of(node_name, stamp, node.take_status(status) or {})
+        self._publish_status(stamp, status)

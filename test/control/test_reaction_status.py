@@ -9,8 +9,8 @@ from wam_description.event import OBEYED, Code, Event, Level, fault, holding, re
 from wam_description.event_text import news, sentence
 from wam_description.signals import BASE, NodeStatus
 from wam_description.status import pairs, parse, with_refused
-from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
-from wam_sim.recorded_run import RecordedStep
+from wam_sim.reactions import RecordedReaction, RecordedStep, is_too_short, lasting, unmet, watched_times
+from wam_sim.reactions import settling_time_in as longest
 
 SECOND = 1_000_000_000
 PUSH = {"allowed": 20.0, "limit": "limits.whole_force"}
@@ -139,6 +139,6 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     settling = [(0, 2.0), (3 * SECOND, 60.0), (5 * SECOND, 1.0)]
     spans = [(1, 2), (1, 4), (5, 6)]
     during = [steps[0]._replace(begin=begin * SECOND, end=end * SECOND) for begin, end in spans]
-    found = [settling_time_in(settling, one) for one in during]
+    found = [longest(settling, one) for one in during]
     assert found == [2.0, 60.0, 1.0]
-    assert math.isnan(settling_time_in([], steps[0]))
+    assert math.isnan(longest([], steps[0]))

@@ -61,6 +61,6 @@ def _moment(recording: AnalysedRecording) -> int:
     traces, holds = recording.traces, recording.holds
     if holds:
         hardest = max(holds, key=lambda hold: hold.commanded)
-        return (steady_begin(hardest) + hardest.end) // 2
+        return (steady_begin(hardest.begin, hardest.end) + hardest.end) // 2
     contacts = contact_rows(traces.stamp, traces.true.acts) or contact_rows(traces.stamp, traces.estimated.acts)
     return int(traces.stamp[sum(contacts[0]) // 2 if contacts else -1])
