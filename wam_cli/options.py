@@ -9,13 +9,13 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
 from wam_description.configuration import Configuration, differences, option_values, packaged
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_live.thresholds import LIVE
-from wam_sim.batch import executor
+from wam_sim.batch import dask, processes
 from wam_sim.pieces import default_file
 from wam_sim.progress import Progress
 
@@ -280,14 +280,6 @@ def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
     take_port(parser)
 
 
-class BatchOptions(NamedTuple):
-    """Executor, file of finished pieces, and progress report of a batch."""
-
-    executor: Executor
-    file: Path | None
-    report: Progress
-
-
 def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
     """Give a command of this name the options of a long computation."""
     parser.add_argument("--jobs", type=_JOBS, help="number of processes; default: one for each core")
@@ -306,13 +298,14 @@ def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
 
 
 @contextmanager
-def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
-    """What the options of `take_batch` name, with no more processes than pieces; progress goes to stderr."""
+def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[tuple[Executor, Path | None, Progress]]:
+    """Executor, file of finished pieces and report to stderr of a batch, with no more processes than pieces."""
     if not given.fresh and (reason := unwritable(given.results.parent)):
         raise ValueError(f"{reason}; give another directory with --results")
-    with executor(min(given.jobs or os.cpu_count() or 1, pieces), given.dask) as found:
+    workers = min(given.jobs or os.cpu_count() or 1, pieces)
+    with dask(given.dask) if given.dask else processes(workers) as executor:
         progress = Progress(getattr(given, "part", given.command), sys.stderr)
-        yield BatchOptions(found, None if given.fresh else given.results, progress)
+        yield executor, None if given.fresh else given.results, progress
 
 
 OTHER_ROBOT = (

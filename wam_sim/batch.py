@@ -92,19 +92,6 @@ def _result(future: Future[Output], given: Any) -> Output:
 
 
 @contextmanager
-def executor(workers: int | None, dask_address: str | None) -> Iterator[Executor]:
-    """The executor of `dask` if an address is given, else that of `processes`.
-
-    Parameters
-    ----------
-    workers : processes on this computer.
-    dask_address : of a scheduler.
-    """
-    with dask(dask_address) if dask_address else processes(workers) as found:
-        yield found
-
-
-@contextmanager
 def processes(workers: int | None = None) -> Iterator[Executor]:
     """Executor of processes on this computer; on Ctrl-C, or if this process dies, they end at once.
 

@@ -252,9 +252,9 @@ def test_no_more_processes_are_started_than_there_are_pieces(
     workers: int, pieces: int, count: int, tmp_path: Path
 ) -> None:
     given = argparse.Namespace(jobs=workers, dask=None, fresh=True, command="sweep")
-    with batch_of(given, pieces) as options:
-        assert isinstance(options.executor, ProcessPoolExecutor)
-        assert len(options.executor._processes) == count
+    with batch_of(given, pieces) as (executor, _, _):
+        assert isinstance(executor, ProcessPoolExecutor)
+        assert len(executor._processes) == count
 
 
 @pytest.mark.slow

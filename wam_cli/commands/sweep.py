@@ -105,8 +105,8 @@ def run(given: argparse.Namespace) -> int:
     seed = 1 if given.seed is None else given.seed
     sets = drawn(axes, given.random, seed) if given.random else listed(axes) if given.list else grid(axes)
     function, cases, is_kept = (_of_experiment if given.experiment else _of_scenario)(given, sets)
-    with batch_of(given, len(cases)) as batch:
-        found = results(function, cases, batch.executor, batch.file if is_kept else None, batch.report)
+    with batch_of(given, len(cases)) as (executor, file, report):
+        found = results(function, cases, executor, file if is_kept else None, report)
     rows, titles = _table(sets, found)
     _write(given.file, rows)
     if given.picture:  # of a scenario what is of the whole run, and not of one of its steps
