@@ -3,12 +3,12 @@
 import importlib
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from functools import cache, partial
 from typing import Any, Final
 
 from rcl_interfaces.srv import DescribeParameters
-from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from wam_description.arm import Shared
@@ -355,23 +355,20 @@ class StackClient(Closing):
 
 
 def run_next_to(
-    namespace: str,
-    make: Callable[[Any, Shared], Node],
-    until: Callable[[], bool],
-    between: Callable[[Any], object] = lambda node: None,
+    namespace: str, name: str, make: Callable[[StackClient], AbstractContextManager[Any]], until: Callable[[], bool]
 ) -> None:
-    """Run a node of the user's until a condition holds, next to a stack, which may start later.
+    """Run a program until a condition holds, next to a stack, which may start later.
 
     Parameters
     ----------
     namespace : of the stack.
-    make : makes the node from the context of ROS and the driver's shared parameters.
+    name : of the program's node.
+    make : makes what works, from a client that has the driver's shared parameters.
     until : the condition.
-    between : called with the node between two callbacks, at least every tenth of a second.
     """
-    with StackClient(namespace, "asks_for_parameters") as client:
+    with StackClient(namespace, name) as client:
         if found := client.await_driver(until):
-            node = client.connection.add(make(client.connection.context, build_part(Shared, found["driver"])))
-            while not until():
-                client.spin_once(0.1)
-                between(node)
+            client.shared = build_part(Shared, found["driver"])
+            with make(client):
+                while not until():
+                    client.spin_once(0.1)

@@ -13,6 +13,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.frames import ArmFrames, FramePlacement
 from wam_description.urdf import urdf
 from wam_ros.bring_up import Composition
+from wam_ros.client import StackClient
 
 
 def arm_of(name: str) -> Arm:
@@ -87,22 +88,18 @@ def test_a_running_stack_has_its_frames_on_tf(domain_id: int, namespace: str, pr
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from sensor_msgs.msg import JointState
 
-    from wam_live.frame_publisher import FramesNode
+    from wam_live.frame_publisher import FramePublisher
 
     configuration = Configuration.load(packaged("wam"))
     shared = configuration.shared
     with Composition(configuration, namespace=namespace, domain_id=domain_id) as stack:
-        nodes = [
-            FramesNode(stack.context, namespace, shared, prefix),
-            onlooker := Node("onlooker", context=stack.context, namespace=namespace),
-        ]
+        FramePublisher(StackClient(namespace, "frames", stack, shared), prefix)
+        onlooker = stack.add(Node("onlooker", context=stack.context, namespace=namespace))
         moving, fixed, states = [], [], []
         onlooker.create_subscription(messages.TFMessage, f"{topics}tf", moving.append, 10)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         onlooker.create_subscription(messages.TFMessage, f"{topics}tf_static", fixed.append, latched)
         onlooker.create_subscription(JointState, "joint_states", states.append, 1000)
-        for one in nodes:
-            stack.executor.add_node(one)
 
         def stamp_of(message: object) -> tuple[int, int]:
             return message.header.stamp.sec, message.header.stamp.nanosec  # type: ignore[attr-defined]
@@ -112,9 +109,6 @@ def test_a_running_stack_has_its_frames_on_tf(domain_id: int, namespace: str, pr
 
         stack.spin(lambda: len(common()) > 3 and bool(fixed))
         at = max(common())
-        for one in nodes:
-            stack.executor.remove_node(one)
-            one.destroy_node()
     (q,) = (one.position.tolist() for one in states if stamp_of(one) == at)
     (sent,) = (one for one in moving if stamp_of(one.transforms[0]) == at)
     assert {stamp_of(one) for one in sent.transforms} == {at}

@@ -17,8 +17,9 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from wam_control.task.trajectory_goal import GoalCode
 from wam_description.configuration import Configuration, packaged
-from wam_live.trajectory_action import TrajectoryActionNode
+from wam_live.trajectory_action import TrajectoryServer
 from wam_ros.bring_up import Composition
+from wam_ros.client import StackClient
 
 JOINTS = ("joint1", "joint2", "joint3", "joint4")
 REACHED = [0.1, -0.9, 0.0, 0.4]
@@ -30,10 +31,8 @@ def follow(domain_id: int) -> Iterator[Client]:
     """Sends a goal to an enabled stack: status, error code and text of its end, and the feedback."""
     configuration = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 2.0})
     with Composition(configuration, domain_id=domain_id) as stack:
-        server = TrajectoryActionNode(stack.context, "wam", configuration.shared)
-        node = Node("planner", context=stack.context, namespace="wam")
-        for one in (server, node):
-            stack.executor.add_node(one)
+        server = TrajectoryServer(StackClient("wam", "trajectory_action", stack, configuration.shared), print)
+        node = stack.add(Node("planner", context=stack.context, namespace="wam"))
         client = ActionClient(node, FollowJointTrajectory, "follow_joint_trajectory")
         brakes = node.create_client(SetBool, "driver/enable")
 
@@ -65,13 +64,11 @@ def follow(domain_id: int) -> Iterator[Client]:
             return found.status, found.result.error_code, found.result.error_string, feedback
 
         send.enable = enable  # type: ignore[attr-defined]
-        stack.spin(lambda: server.count_publishers("status") > 0)
+        stack.spin(lambda: node.count_publishers("status") > 0)
         enable(True)
         stack.spin(lambda: not server._obstacle)
         yield send
-        for one in (server, node):
-            stack.executor.remove_node(one)
-            one.destroy_node()
+        server.close()
 
 
 def test_goals_are_followed_cancelled_and_refused_with_the_reason(follow: Client) -> None:

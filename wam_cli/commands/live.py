@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -52,10 +53,8 @@ def run(given: argparse.Namespace) -> int:
 
     given.namespace = given.namespace or ARM
     die_with_parent()
-    if given.tf:
-        _frames(given)
-    elif given.trajectories:
-        _trajectories(given)
+    if given.tf or given.trajectories:
+        _program(given)
     else:
         _page(given)
     return 0
@@ -73,23 +72,21 @@ def _page(given: argparse.Namespace) -> None:
     page.run(lambda: stop.is_set)
 
 
-def _frames(given: argparse.Namespace) -> None:
-    from wam_live.frame_publisher import FramesNode
+def _program(given: argparse.Namespace) -> None:
+    """Run what other programs of ROS use, next to the stack."""
     from wam_ros.client import run_next_to
 
-    stop, prefix = Stop(), given.frame_prefix or ""
-    run_next_to(
-        given.namespace,
-        lambda context, shared: FramesNode(context, given.namespace, shared, prefix),
-        lambda: stop.is_set,
-    )
+    make: Callable[[Any], Any]
+    if given.tf:
+        from wam_live.frame_publisher import FramePublisher
 
+        name, make = "frames", partial(FramePublisher, prefix=given.frame_prefix or "")
+    else:
+        from wam_live.trajectory_action import TrajectoryServer
 
-def _trajectories(given: argparse.Namespace) -> None:
-    from wam_live.trajectory_action import serve
-
+        name, make = "trajectory_action", partial(TrajectoryServer, report=_print)
     stop = Stop()
-    serve(given.namespace, lambda: stop.is_set, _print)
+    run_next_to(given.namespace, name, make, lambda: stop.is_set)
 
 
 def _recording(given: argparse.Namespace) -> int:
