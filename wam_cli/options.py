@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
-from wam_description.configuration import Configuration, differences, option_values, packaged
+from wam_description.configuration import Configuration, differences, named_file, option_values
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_live.thresholds import LIVE
 from wam_sim.batch import dask, processes
@@ -21,7 +21,6 @@ from wam_sim.progress import Progress
 
 BASE_CONFIGURATION = "wam"
 ARM = "wam"  # namespace of a stack, unless another one is given
-YAML_SUFFIXES = (".yaml", ".yml")
 
 # types: a text becomes a value, or a reason why not, which argparse prints with the option's name
 
@@ -149,16 +148,10 @@ def take_configuration(parser: argparse.ArgumentParser, default: str | None = BA
 
 def configuration_of(given: argparse.Namespace) -> Configuration:
     """The configuration that --config names, with the values of --set; prints what a file of your own changes."""
-    file = configuration_file(given)
+    file = named_file(given.config)
     loaded = Configuration.load(file)
     print(*(f"{line}\n" for line in differences(file, loaded)), sep="", end="", file=sys.stderr, flush=True)
     return loaded.with_values(option_values(given.values)) if given.values else loaded
-
-
-def configuration_file(given: argparse.Namespace) -> Path:
-    """The file of the configuration that --config names."""
-    name: str = given.config
-    return Path(name) if name.endswith(YAML_SUFFIXES) else packaged(name)
 
 
 def refuse_overridden(given: argparse.Namespace, own: Collection[str], what: str) -> None:

@@ -25,6 +25,7 @@ BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
 LENGTHS = ("arm.covers.length", "arm.joints.length", "arm.joints.offset")
 MASSES = ("arm.links.mass", "arm.links.centre", "arm.links.inertia")
+YAML = (".yaml", ".yml")  # endings of files
 SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
 _NOT_REQUIRED = frozenset(field.name for field in fields(Shared) if not field.is_required)  # a file need not give them
 
@@ -293,6 +294,11 @@ def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]
     return found
 
 
+def named_file(name: str, kind: str = "configuration", folder: Path = Path()) -> Path:
+    """What a name means: a file, relative to a folder, where it ends as one of YAML; else one of the package."""
+    return folder / name if name.endswith(YAML) else packaged(name, kind)
+
+
 def packaged(name: str, kind: str = "configuration") -> Path:
     """The file of a configuration or scenario that comes with the package, as ``packaged('wam')``.
 
@@ -354,7 +360,7 @@ def _chain(path: Path, above: tuple[Path, ...] = ()) -> list[tuple[Path, Any]]:
         raise ParameterError(
             f"{path}: {BASE} is {name!r}; give the name of a configuration or a path relative to the file"
         )
-    base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
+    base = named_file(name, folder=path.parent)
     if base.resolve() in above:
         raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")
     return [(path, tree), *_chain(base, above)]

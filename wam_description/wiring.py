@@ -31,9 +31,9 @@ starts_with_all : in realtime, do nothing before all nodes of the bring-up are c
 topics : rows of the table of topics that this node adds.
 """
 
-import importlib
 import traceback
 from collections.abc import Callable, Collection, Mapping, Sequence
+from pkgutil import resolve_name
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from wam_description.arm import Shared, seconds
@@ -190,10 +190,7 @@ class Declaration(NamedTuple):
     def parameter_class(self) -> Any:
         """The class of the node's own parameters; imported now where it is given as 'module:Class'."""
         kind = self.node.parameters
-        if not isinstance(kind, str):
-            return kind
-        module, _, name = kind.partition(":")
-        return getattr(importlib.import_module(module), name)
+        return resolve_name(kind) if isinstance(kind, str) else kind
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -19,6 +19,3 @@ class DriverInterface:
         "/clock",
     )
     listens = ("motor_current_command", "sim/disturbance")
-
-    def take_status(self) -> None:
-        """Every node reports to the driver, which starts when all are connected."""

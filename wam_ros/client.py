@@ -1,10 +1,10 @@
 """A running stack as a program next to it sees it: requests, parameters, statuses, topics."""
 
-import importlib
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from functools import cache, partial
+from pkgutil import resolve_name
 from typing import Any, Final
 
 from rcl_interfaces.srv import DescribeParameters
@@ -307,14 +307,12 @@ class StackClient(Closing):
 
         last = time.monotonic()
         self._require(kinds, f"no topic {name}", topics, lambda: check(time.monotonic() - last))
-        package, _, kind = kinds()[0].split("/")
+        kind = resolve_name(kinds()[0].replace("/", "."))
         row = BY_NAME.get(topic)
         newest = QoSProfile(depth=CALL_LIMITS.waiting, reliability=ReliabilityPolicy.BEST_EFFORT)
         profile = listening(row) if row is not None and row.latched else newest
         taken: list[Any] = []
-        subscription = self.node.create_subscription(
-            getattr(importlib.import_module(f"{package}.msg"), kind), name, taken.append, profile
-        )
+        subscription = self.node.create_subscription(kind, name, taken.append, profile)
         try:
             while True:
                 self.spin_once(0.1)

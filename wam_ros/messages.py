@@ -1,8 +1,8 @@
 """Between ROS messages and plain values: whatever the codec of `wam_ros.wire` does not know by its layout."""
 
-import importlib
 import struct
 from collections.abc import Callable, Sequence
+from pkgutil import resolve_name
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -164,8 +164,7 @@ def read_status(message: DiagnosticStatus) -> NodeStatus:
 
 def message_type(topic: Topic) -> Any:
     """Message class of a row of the table of topics."""
-    package, _, name = topic.type.split("/")
-    return getattr(importlib.import_module(f"{package}.msg"), name)
+    return resolve_name(topic.type.replace("/", "."))
 
 
 def plain(message: Any, topic: str = "") -> Any:

@@ -1,6 +1,5 @@
 """The adapter that makes a ROS node from a declared one (`wam_description.wiring`)."""
 
-import importlib
 import math
 import os
 import time
@@ -8,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -272,8 +272,7 @@ def make_node(entry: str, **ros: Any) -> Node:
     declaration = declared(entry)
     if not declaration.ros_node:
         return AdaptedNode(declaration, **ros)
-    module, _, name = declaration.ros_node.partition(":")
-    node: Node = getattr(importlib.import_module(module), name)(**ros)
+    node: Node = resolve_name(declaration.ros_node)(**ros)
     return node
 
 

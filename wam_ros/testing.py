@@ -21,7 +21,7 @@ from rclpy.publisher import Publisher
 
 from wam_bag.bag import Bag, read
 from wam_bag.columns import columns_of
-from wam_description.configuration import SHARED, Configuration, packaged
+from wam_description.configuration import SHARED, Configuration, named_file
 from wam_description.defects import UnusableOutput, defect_finder, output_check
 from wam_description.interface import Interface, declared, is_packaged, require_parameters
 from wam_description.parameters import ParameterError, dotted, meant, require
@@ -518,8 +518,7 @@ def configured(
     require(not isinstance(nodes, str), f"nodes is '{nodes}'; give a list, as ['{nodes}']")
     base = configuration
     if not isinstance(base, Configuration):
-        path = Path(base)
-        base = Configuration.load(path if path.suffix else packaged(str(base)))
+        base = Configuration.load(named_file(str(base)))
     replaced = {name: _entry(value) for name, value in values.items() if _is_node(value)}
     every = [*(nodes or base.shared.nodes), *map(_entry, own)]
     entries = [replaced.pop(declared(entry).name, entry) for entry in every]

@@ -31,7 +31,7 @@ from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.guard import Report
 from wam_control.task.scenario import ScenarioStep, load_for
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import Configuration, named_file
 from wam_description.rigid_body import RigidBody
 from wam_sim.recorded_run import recorded_run
 from wam_sim.simulated_bag import record
@@ -55,8 +55,7 @@ def load(name: str | Path = "wam", values: Mapping[str, Any] | None = None) -> C
     ParameterError
         names the parameter and what is allowed.
     """
-    path = Path(name)
-    configuration = Configuration.load(path if path.suffix in (".yaml", ".yml") else packaged(str(name)))
+    configuration = Configuration.load(named_file(str(name)))
     configuration = configuration.with_values(values) if values else configuration
     _ = configuration.shared  # checks it
     return configuration

@@ -19,9 +19,7 @@ from wam_bag.bag import read
 from wam_bag.bag_name import dated
 from wam_cli.options import (
     SEED,
-    YAML_SUFFIXES,
     bounded,
-    configuration_file,
     configuration_of,
     output_file,
     recording_folder,
@@ -31,7 +29,7 @@ from wam_cli.options import (
 )
 from wam_control.task.scenario import load_for
 from wam_description.arm import Shared
-from wam_description.configuration import Configuration, files_of
+from wam_description.configuration import YAML, Configuration, files_of, named_file
 from wam_description.parameters import ParameterError
 from wam_ros.process_signals import Stop
 from wam_sim.progress import Progress
@@ -40,8 +38,8 @@ from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 
 HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
-MODEL = output_file("a configuration", YAML_SUFFIXES, MODEL_HEADING)
-MOVES = output_file("a scenario", YAML_SUFFIXES, HEADING)
+MODEL = output_file("a configuration", YAML, MODEL_HEADING)
+MOVES = output_file("a scenario", YAML, HEADING)
 TOPICS = ("motor_states", "status", *LOADS)
 
 
@@ -75,7 +73,7 @@ def run(given: argparse.Namespace) -> int:
         raise ValueError("give a bag, or --excite SCENARIO to make one")
     require_option(given, "--excite", "--seconds", "--seed", "--only-write")
     configuration = configuration_of(given)
-    if given.write and given.write.resolve() in [one.resolve() for one in files_of(configuration_file(given))]:
+    if given.write and given.write.resolve() in [one.resolve() for one in files_of(named_file(given.config))]:
         raise ValueError(f"{given.write} would be overwritten, but this command reads it; give another file")
     bag = given.bag
     if given.excite is not None:
@@ -106,7 +104,7 @@ def run(given: argparse.Namespace) -> int:
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         folder, base = given.write.resolve().parent, given.config
-        if base.endswith(YAML_SUFFIXES):
+        if base.endswith(YAML):
             base = os.path.relpath(Path(base).resolve(), folder)
         write_overlay(given.write, base, values, command)
         print(

@@ -25,7 +25,7 @@ from wam_control.task.task_text import as_of_file, require_task, task_of_text, t
 from wam_control.thresholds import MOTION
 from wam_description import yaml_text
 from wam_description.arm import Arm, Covers, Shared
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import Configuration, named_file
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint, PosturePath, Triple, Wrench
@@ -414,7 +414,7 @@ def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
 
 def script_file(script: str) -> Path:
     """The file of a scenario: a path that ends in '.yaml' or '.yml', or the name of one that comes with the package."""
-    return Path(script) if script.endswith((".yaml", ".yml")) else packaged(script, "scenario")
+    return named_file(script, "scenario")
 
 
 def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
