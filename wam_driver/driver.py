@@ -269,8 +269,9 @@ class Driver:
             self.plant.push(self._disturbed, ZERO, ZERO)
             self._disturbed = ""
 
-    def set_effects(self, effects: Effects) -> None:
+    def tune(self, own: DriverParameters) -> None:
         """Take the effects that can change while the arm runs: added friction, active pretension."""
+        effects = own.effects
         effects.require_fit(self._arm)
         self.plant.set_added_friction(effects.added_coulomb_friction)
         self.plant.set_pretension(effects.pretension_share)

@@ -30,7 +30,7 @@ class DriverNode(ArmDriver):
         timing, interface = shared.timing, self.interface
         self.driver = Driver(shared, own)
         self.safety = self.driver.safety
-        follow(self, own, lambda new: self.driver.set_effects(new.effects))
+        follow(self, own, self.driver.tune)
         self._directory = own.post_mortem_directory
         self.inlets.feed("sim/disturbance", self._take_push)
         self.serve("pause", SetBool, self._pause)

@@ -215,14 +215,11 @@ class Simulation:
         self._currents = (stamp, currents)
 
     def _make(self, request: Call | SetParameters) -> str:
-        if request.node != "driver" and request.node not in self.nodes:
+        node = self.driver if request.node == "driver" else self.nodes.get(request.node)
+        if node is None:
             return f"no node is named '{request.node}'; nodes: driver, {', '.join(self.nodes)}"
         if isinstance(request, SetParameters):
-            try:
-                self._tune(request)
-            except ParameterError as error:
-                return f"{request.node} refuses: {error}"
-            return ""
+            return self._tune(node, request)
         if request.service == "pause":  # nobody waits for the time of a simulation
             return ""
         if request.service == "enable":
@@ -231,21 +228,20 @@ class Simulation:
             for synchroniser in set().union(*self._synchronisers.values()):
                 synchroniser.discard_commands(self.driver.stamp + self._timing.period_ns)
         else:
-            answer = getattr(self.driver if request.node == "driver" else self.nodes[request.node], request.service)()
+            answer = getattr(node, request.service)()
         return "" if answer.success else answer.message
 
-    def _tune(self, request: SetParameters) -> None:
-        """Give a node new live parameters; where it refuses them, nothing has changed."""
+    def _tune(self, node: Any, request: SetParameters) -> str:
+        """Give a node new live parameters; where it refuses them, nothing has changed, and the reason is returned."""
         before = self._settings.get(request.node, {})
         values = {**before, **request.values}
-        if values == before:
-            return
-        if request.node == "driver":
-            self.driver.set_effects(build(DriverParameters, values).effects)
-        else:
-            declaration = self._interface.declarations[request.node]
-            self.nodes[request.node].tune(build(declaration.parameter_class, values))
-        self._settings[request.node] = values
+        if values != before:
+            try:
+                node.tune(build(self._interface.declarations[request.node].parameter_class, values))
+            except ParameterError as error:
+                return f"{request.node} refuses: {error}"
+            self._settings[request.node] = values
+        return ""
 
     def _cause(self, topics: Sequence[str] = ("motor_current_command",)) -> str:
         """The node that is the reason why topics do not come, the command if none is given, and what to do about it."""

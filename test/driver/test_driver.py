@@ -481,9 +481,9 @@ def test_a_spring_beyond_the_end_of_its_link_is_refused() -> None:
 
 
 def test_added_friction_on_the_wrong_number_of_joints_is_refused() -> None:
-    wrong = dataclasses.replace(no_effects(WAM), added_coulomb_friction=(0.1,))
+    effects = dataclasses.replace(no_effects(WAM), added_coulomb_friction=(0.1,))
     with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 values; it needs 4"):
-        driver().set_effects(wrong)
+        driver().tune(dataclasses.replace(driver().parameters, effects=effects))
 
 
 def stopped_at_speed(q: list[float], qd: list[float], stop: Callable[[Driver], Any], **parameters: float) -> Driver:
