@@ -100,13 +100,14 @@ def _arguments(file: str, namespace: str, log_level: str) -> list[str]:
 
 def run_together(
     configuration: Configuration,
+    entries: Sequence[str],
     namespace: str,
-    log_level: str,
-    stop: Stop,
-    before_end: Callable[[], object],
+    log_level: str = "info",
+    stop: Stop | None = None,
+    before_end: Callable[[], object] = lambda: None,
 ) -> str:
-    """Run the nodes of a configuration, after `require_start`, as this process; see `Processes` and `run`."""
-    makers = node_makers(configuration.shared.nodes)
+    """Run nodes with the values of a configuration as this process; see `Processes` and `run`."""
+    makers = node_makers(entries)
     with parameter_file(configuration) as file:
         return run(makers, ["wam", *_arguments(str(file), namespace, log_level)], stop, before_end)
 

@@ -55,20 +55,17 @@ def _record(given: argparse.Namespace) -> None:
             )
     configuration = configuration_of(given).with_values({f"{RECORDER}:name": given.name})
     recording_folder(configuration, given.name)
-    from wam_ros.client import StackClient  # the other requests need no ROS
-    from wam_ros.node import node_makers, parameter_file
-    from wam_ros.run import run as run_node
+    from wam_ros.bring_up import run_together  # the other requests need no ROS
+    from wam_ros.client import StackClient
 
     with StackClient(given.namespace) as stack:
         shared = stack.read_shared()
     nodes = [name for name in Interface(shared).names if name != RECORDER]
     print(f"the stack in /{given.namespace} runs in {shared.timing.mode}: {', '.join(nodes)}", flush=True)
     others = [entry for entry in shared.nodes if entry != RECORDER]  # this recorder is no part of the stack
-    with parameter_file(configuration.with_values({**values(shared), "nodes": others})) as file:
-        where = f"__ns:=/{given.namespace}"
-        arguments = ["wam", "--ros-args", "--params-file", str(file), "-r", where]
-        if failure := run_node(node_makers([RECORDER]), arguments):
-            raise SystemExit(f"error: {failure}")
+    configuration = configuration.with_values({**values(shared), "nodes": others})
+    if failure := run_together(configuration, [RECORDER], given.namespace):
+        raise SystemExit(f"error: {failure}")
 
 
 def described(found: Bag) -> list[str]:

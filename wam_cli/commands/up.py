@@ -103,8 +103,9 @@ def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Sto
             require_start(configuration, given.namespace)
             if started:
                 print(f"{started} this process; Ctrl-C stops them", flush=True)
-            failure = run_together(configuration, given.namespace, given.log_level, stop, close_page)
-            names = ", ".join(declared(entry).name for entry in configuration.shared.nodes)
+            nodes = configuration.shared.nodes
+            failure = run_together(configuration, nodes, given.namespace, given.log_level, stop, close_page)
+            names = ", ".join(declared(entry).name for entry in nodes)
             return Ended({} if stop.is_set else {names: int(bool(failure))}, failure)
         with Processes(configuration, given.namespace, given.log_level, processes) as stack:
             if started and not stop.is_set:
