@@ -217,11 +217,10 @@ class ArmDriver(StackNode):
         reported = (state, self.health.is_ready, session.number, session.since, self.is_paused)
         if reported == self._reported:
             return
-        is_new_fault = bool(safety.fault) and state != self._reported[0]
-        self._reported = reported
         message = f"{safety.mode.value}: {'; '.join(dict.fromkeys(reasons))}".removesuffix(": ")
-        if is_new_fault:
+        if safety.fault and state != self._reported[0]:
             self.get_logger().error(message)
+        self._reported = reported
         self.health.publish(
             NodeStatus(
                 Level.ERROR if safety.fault or problem else Level.WARN if warnings else Level.OK,
@@ -236,11 +235,6 @@ class ArmDriver(StackNode):
             )
         )
         self._inform()
-        if is_new_fault:
-            self.keep_samples()
-
-    def keep_samples(self) -> None:
-        """Keep what came before a fault, where the driver has it."""
 
     def _inform(self) -> None:
         """Print on the console what the driver's state is and what to call next, where that has changed."""

@@ -1,10 +1,7 @@
 """The simulated hardware driver: plant, amplifier, safety and watchdog, without ROS and without a clock."""
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from struct import Struct
-from typing import NamedTuple
 
 import numpy as np
 
@@ -57,18 +54,6 @@ class DriverParameters:
         high=100.0,
     )
     tip_speed_limit: float = parameter("speed of the tool above which the driver faults", "m/s", high=100.0)
-    post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
-    post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
-
-
-class DriverSample(NamedTuple):
-    """One period of the driver, kept for the post-mortem."""
-
-    stamp: int
-    theta: list[float]
-    thetad: list[float]
-    commanded: list[float]
-    actual: list[float]
 
 
 def _require_springs(arm: Arm, world: World) -> None:
@@ -123,10 +108,6 @@ class Driver:
         _require_springs(arm, parameters.world)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
-        # packed: objects that live so long drive those in use out of the processor's caches (benchmarks/README.md)
-        self._sample = Struct(f"q{4 * len(arm.motors.names)}d")
-        self._packed = self._sample.pack
-        self._recent: deque[bytes] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
         self._arm, self.timing, self.parameters, self._push_excess = arm, timing, parameters, shared.push_excess
@@ -204,9 +185,6 @@ class Driver:
             enabled = False
         self._begin_period(self._tick + 1)
         self._measure()
-        if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
-            theta, thetad = self._true_motion
-            self._recent.append(self._packed(self.stamp, *theta, *thetad, *self._command, *self.currents))
         self._pulls.append(self.plant.cable_pull)
         if self.is_outer:
             self._watch_limits(enabled)
@@ -221,7 +199,7 @@ class Driver:
             return
         if pushed := self.plant.pushes_in_words():
             self._last_push = pushed, self._tick
-        watched = self._watch.watched(*self._true_motion, self.currents, tensions)
+        watched = self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
@@ -297,16 +275,9 @@ class Driver:
     def _measure(self) -> None:
         plant, period = self.plant, self.timing.period
         torque = self.amplifier.nominal_torque(self.currents)
-        self._true_motion = theta, thetad = plant.theta, plant.thetad
-        self.motor_state = self._sensors.motors.read(State(theta, thetad, torque), period)
+        self.motor_state = self._sensors.motors.read(State(plant.theta, plant.thetad, torque), period)
         if self._arm.joint_sensors:
             self.joint_sensors = self._sensors.joints.read(State(plant.q, plant.qd, plant.strain_torque), period)
-
-    @property
-    def recent(self) -> list[DriverSample]:
-        """The last periods, up to the last fault."""
-        rows = map(self._sample.unpack, self._recent)
-        return [DriverSample(stamp, *np.reshape(values, (4, -1)).tolist()) for stamp, *values in rows]
 
     @property
     def true_joint_state(self) -> State:

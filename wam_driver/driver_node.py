@@ -1,10 +1,6 @@
 """Node `driver`: the arm's hardware as the stack sees it, simulated."""
 
-import tempfile
 import time
-from collections.abc import Callable
-from itertools import chain
-from pathlib import Path
 from typing import Any
 
 from std_srvs.srv import SetBool, Trigger
@@ -12,7 +8,7 @@ from std_srvs.srv import SetBool, Trigger
 from wam_description.interface import declared
 from wam_description.signals import Answer, Wrench
 from wam_driver.arm_driver_node import ArmDriver
-from wam_driver.driver import Driver, DriverSample
+from wam_driver.driver import Driver
 from wam_driver.lockstep import Lockstep
 from wam_driver.realtime import Realtime
 from wam_driver.thresholds import DRIVER
@@ -31,13 +27,10 @@ class DriverNode(ArmDriver):
         self.driver = Driver(shared, own)
         self.safety = self.driver.safety
         follow(self, own, self.driver.tune)
-        self._directory = own.post_mortem_directory
         self.inlets.feed("sim/disturbance", self._take_push)
         self.serve("pause", SetBool, self._pause)
         self.serve("reset", Trigger, lambda _: self.driver.reset())
         self.serve("step", Trigger, lambda _: self._step())
-        if self._directory:  # a person is warned at the start, not at the fault
-            self._into_directory(lambda directory: tempfile.TemporaryFile(dir=directory).close())
         self.time: Lockstep | Realtime
         if timing.mode == "lockstep":
             self.time = Lockstep(
@@ -160,32 +153,3 @@ class DriverNode(ArmDriver):
                 publish(topic, stamp, value)
         self.health.report(stamp, self.time.facts)
         self.announce()
-
-    # the samples before a fault
-
-    def keep_samples(self) -> None:
-        """Write what came before a fault, where a directory is given."""
-        if not self._directory:
-            return
-        motors, recent = self.shared.arm.motors.names, self.driver.recent
-        names = [f"{what} {motor}" for what in DriverSample._fields[1:] for motor in motors]
-        rows = [",".join(["stamp", *names])]
-        rows += [",".join(map(repr, (stamp, *chain(*values)))) for stamp, *values in recent]
-
-        def write(directory: Path) -> None:
-            path = directory / f"post_mortem_{self.stamp}.csv"
-            path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-            self.get_logger().error(f"the last {len(recent)} samples are in {path}")
-
-        self._into_directory(write)
-
-    def _into_directory(self, write: Callable[[Path], object]) -> None:
-        """Write into the directory, which is made; warn where that is not possible."""
-        directory = Path(self._directory)
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            write(directory)
-        except OSError as error:
-            reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
-            self.health.facts["post_mortem"] = reason
-            self.get_logger().warning(f"{reason}; the last samples before a fault are not kept, give another directory")

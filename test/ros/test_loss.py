@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import pytest
 from conftest import LONG
 from ros_network import Network
-from test_nodes import ARM, MS, SIX, changed, make
+from test_nodes import ARM, MS, SIX, Listener, changed, make
 
 from wam_description.arm import Shared
 from wam_description.event import Level
@@ -39,6 +39,7 @@ class Stack:
         self.start_driver()
         row = BY_NAME["motor_current_command"]
         self._answers = ros.node("watch").create_subscription(message_type(row), row.name, self._take_answer, qos(row))
+        self._heard = Listener(ros, "motor_states")
         self.enable()
 
     def start_driver(self) -> None:
@@ -98,8 +99,8 @@ class Stack:
         self._frozen.clear()
 
     def last_flow(self) -> int:
-        """Arm time of the last state with a current, ns."""
-        return max(sample.stamp for sample in self.driver.recent if any(sample.actual))
+        """Arm time of the last state with a torque of the motors, ns."""
+        return max(stamp_of(state) for state in self._heard.seen["motor_states"] if any(state.effort))
 
 
 LOST = {

@@ -153,14 +153,6 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
     assert gravity.health.counts["steps"] == 2
 
 
-def test_a_directory_that_cannot_be_written_is_a_warning_and_no_end(ros: Any, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("in the way")
-    driver = make(ros, tmp_path, "driver", ["driver"], driver__post_mortem_directory=str(tmp_path / "file" / "in"))
-    assert "cannot be written" in driver.health.facts["post_mortem"], "at the start"
-    assert not request(ros, Trigger, "driver/estop").message.startswith("unexpected")
-    assert driver.driver.safety.fault == "emergency stop"
-
-
 def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, capfd: Any) -> None:
     assert len(str(Refused("x" * 5_000_000))) < 1.2 * NODE_LIMITS.reason_length
     assert "\x1b" not in str(Refused("\x1b[2J"))
