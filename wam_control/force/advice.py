@@ -75,12 +75,11 @@ def tries(
         return FORCE.hysteresis * believe(pose, on_links).doubt <= own.limits.doubt
 
     size = force.value or 0.0
-    is_good = False
-    for at in pins * (not place.is_pinned):  # first, as a refusal advises it at once
-        if is_good := is_obeyed(q, [(1.0, pinned._replace(position=at))], size):
-            break
-        yield {}
-    yield {"pin": at} if is_good else {"no_pin": 1.0}
+    # first, as a refusal advises it at once
+    at = next(
+        (at for at in pins * (not place.is_pinned) if is_obeyed(q, [(1.0, pinned._replace(position=at))], size)), None
+    )
+    yield {"no_pin": 1.0} if at is None else {"pin": at}
     for name, was, angle, pose in _turned(q, joints, own.limits.joint_margin):
         is_good = is_obeyed(pose, places, size)
         yield {"turn": name, "turn_from": was, "turn_to": angle} if is_good else {}

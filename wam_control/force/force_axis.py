@@ -38,7 +38,11 @@ class SensingParameters:
         live=True,
     )
     estimated_torque_sd: float = parameter(
-        "as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True
+        "as torque_sd, with feedback contact_estimate, until the estimator computes it",
+        "N m",
+        low=1e-6,
+        high=1e3,
+        live=True,
     )
     estimated_torque_fraction: float = parameter(
         "as torque_fraction, with feedback contact_estimate", high=1.0, live=True
@@ -151,10 +155,12 @@ class ForceAxes:
     Attributes
     ----------
     covers : of the arm.
+    torque_sd : (n,), N m, of the errors of the torques: at first those of the parameters.
     """
 
     def __init__(self, body: RigidBody, parameters: SensingParameters) -> None:
         arm = body.arm
+        self.torque_sd = np.full(len(arm.joints.names), parameters.torque_sd)
         self._body, self.covers, self._parameters = body, arm.covers, parameters
         self._map = TransmissionMap.of(arm)
         self._armature = np.diag(arm.joints.armature)
@@ -310,7 +316,7 @@ class ForceAxes:
         shift = push.dot(slide) * size
         shifted = friction.dot(slide)  # friction at another position has another lever
         moved = outer(shift, shift) + shifted.T.dot(shifted)
-        spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
+        spread = np.diag(self.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
         across = np.vstack([tangential, *others]) if others else tangential
         spread += across.T.dot(across)
         moved *= position_sd**2

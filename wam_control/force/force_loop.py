@@ -247,6 +247,7 @@ class ForceLoop:
         run = self._run
         if task is None:
             return
+        self._axes.forces.torque_sd = run.still_sd
         places = [self._places(task, axis, contact, one.place) for axis, one in zip(task.axes, run.axes, strict=True)]
         sides = [one.side for one in run.axes]
         links = max(map(len, places))
@@ -311,7 +312,7 @@ class ForceLoop:
         may_watch = bool(axes) and own.is_estimated and not run.is_touching
         is_watching = may_watch and run.shaking.is_watching(self._pose, sensing, self._servo, dt)
         torque_sd = self._measurement.torques.sd
-        if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
+        if holds or is_watching:
             run.still_sd = torque_sd
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])

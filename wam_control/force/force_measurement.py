@@ -72,12 +72,13 @@ class ForceMeasurement:
         self._velocity = list[float]()
         self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
         self.rested, self.speed = 0.0, math.inf
+        self.torques = WorldTorques(self._none, self._none, None, self._none)
         self.restart()
 
     def restart(self, torques: Sequence[float] = ()) -> None:
         """Forget the filtered torques, or go on from others (n,), N m."""
         self._filter = LowPass(torques)
-        self.torques = WorldTorques(self._none, self._none, None, self._none)
+        self.torques = self.torques._replace(now=self._none, before=self._none, acceleration=None)
 
     def step(self, own: ForceLoopParameters, given: ForceInput, is_touched: bool) -> None:
         """Take the signals of one outer period.
