@@ -52,7 +52,7 @@ def spectral_lines(time: Numbers, value: Numbers, stamps: Numbers) -> list[Spect
         is_near = groups.count(near) < CYCLE.lines and amplitude[k] >= CYCLE.clear_line * amplitude[near]
         if not (is_drift or is_clear or near == k or (is_near and near in heads)):
             continue
-        if power[k] < sure * max(_nearest(levels, free, k), _noise(levels, free, k)):
+        if power[k] < sure * _noise(levels, free, k):
             continue
         heads |= {k} & {near}
         free[max(k - CYCLE.lobe, 0) : k + CYCLE.lobe + 1] = False
@@ -75,14 +75,11 @@ def _windowed(value: Numbers) -> tuple[Numbers, Numbers]:
     return flat * window, window
 
 
-def _nearest(levels: Numbers, free: Mask, k: int) -> float:
-    """Power of the nearest bins: the level of the noise where it is higher than `_noise`, as next to a transient."""
-    rows = np.r_[max(k - 4, 1) : k - 2, k + 3 : min(k + 5, len(levels))]
-    return math.exp(2.0 * float(np.mean(levels[rows][free[rows]])) + CYCLE.euler_gamma) if np.any(free[rows]) else 0.0
-
-
 def _noise(levels: Numbers, free: Mask, k: int) -> float:
-    """Power of the noise at a bin: of a line through the logarithms of amplitude and frequency of its neighbours."""
+    """Power of the noise at a bin: of a line through the logarithms of amplitude and frequency of its neighbours.
+
+    The nearest bins have more next to a transient: then it is theirs.
+    """
     least, most = CYCLE.neighbours
     reach = min(max(k // 2, least), most)
     rows = np.r_[max(k - reach, 1) : k - 2, k + 3 : min(k + reach + 1, len(levels))]
@@ -90,4 +87,6 @@ def _noise(levels: Numbers, free: Mask, k: int) -> float:
     if len(rows) < 2:
         return math.inf
     line = np.polynomial.polynomial.polyfit(np.log(rows / k), 2.0 * levels[rows], 1)
-    return math.exp(float(line[0]) + CYCLE.euler_gamma)
+    nearest = levels[rows[np.abs(rows - k) <= 4]]
+    level = max(line[0], 2.0 * np.mean(nearest)) if len(nearest) else line[0]
+    return math.exp(float(level) + CYCLE.euler_gamma)
