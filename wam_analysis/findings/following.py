@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.force import fate_words
-from wam_analysis.findings.force_steps import UNSTABLE, force_steps, many_steps
+from wam_analysis.findings.force import SWINGS_ON, fate_words
+from wam_analysis.findings.force_steps import force_steps, steady_error
 from wam_analysis.findings.repetition import LEAST
 from wam_analysis.foreign.pieces import resolution, rests
 from wam_analysis.foreign.source import AXES, Source
@@ -38,10 +38,8 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                 numbers |= {"gain": (found.gain, ""), "delay": (found.delay, "s"), "offset": (found.offset, unit)}
                 numbers |= {"play": (found.play, unit)} if found.play else {}
             if steps:
-                worst = max(steps, key=lambda step: step.error)
-                off = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
-                remarks.append(f"{many_steps(steps, 'step')}; the largest steady error is {off}")
-                numbers["largest steady error"] = (worst.error, unit)
+                remarks.append(steady_error(steps, "step", unit))
+                numbers["largest steady error"] = (max(step.error for step in steps), unit)
                 known = [step.response for step in steps if math.isfinite(step.response.rise)]
                 if known and found is None:  # a path has a rise of its own
                     overshoot = 100.0 * max(one.overshoot for one in known)
@@ -51,7 +49,7 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                 wrong += [
                     f"{name}, {shown(step.commanded, unit)} at {step.begin:.1f} s: it {fate_words(step.swings)}."
                     for step in steps
-                    if step.swings.verdict in UNSTABLE
+                    if step.swings.verdict in SWINGS_ON
                 ]
             sentences += [f"{name}: {'; '.join(remarks)}."] if remarks else []
             findings += [Finding(f"{name}: {what}", of, value) for what, (value, of) in numbers.items()]

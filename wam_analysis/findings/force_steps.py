@@ -8,7 +8,7 @@ import numpy as np
 
 from wam_analysis.findings.effort import limited
 from wam_analysis.findings.finding import Finding, Section, counted, shown, when
-from wam_analysis.findings.force import fate_words, response_findings
+from wam_analysis.findings.force import SWINGS_ON, fate_words, response_findings
 from wam_analysis.findings.repetition import LEAST, is_known
 from wam_analysis.findings.topics import frame_change
 from wam_analysis.foreign.pieces import pieces
@@ -20,10 +20,8 @@ from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, SHAFT, STREAM
-from wam_theory.verdicts import Verdict
 
 FORCE = AXES[:3]
-UNSTABLE = Verdict.DIVERGED, Verdict.LIMIT_CYCLE
 
 
 class ForceStep(NamedTuple):
@@ -64,7 +62,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     axes = [axis for axis in measured.values if axis in command.values]
     measured, command = measured.only(*axes), command.only(*axes)
     known = ~command.is_away(measured.time)
-    if not axes or not np.any(known):
+    if not np.any(known):
         return []
     desired = np.column_stack([command.values[axis] for axis in axes])
     least = LEAST[measured.units[axes[0]]] if measured.is_joint else HOLD.equal_force
@@ -104,10 +102,12 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     return found
 
 
-def many_steps(steps: Sequence[ForceStep], what: str) -> str:
-    """How many steps there are, in words; what was commanded from the beginning is none."""
+def steady_error(steps: Sequence[ForceStep], what: str, unit: str) -> str:
+    """How many steps there are, and the largest error; what was commanded from the beginning is no step."""
     number = sum(not math.isnan(step.before) for step in steps)
-    return counted(number, what) if number else "commanded from the beginning"
+    worst = max(steps, key=lambda step: step.error)
+    error = f"the largest steady error is {shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
+    return f"{counted(number, what) if number else 'commanded from the beginning'}; {error}"
 
 
 def step_section(recording: AnalysedRecording) -> Section | None:
@@ -145,7 +145,7 @@ def step_section(recording: AnalysedRecording) -> Section | None:
             settled += ", without a lasting rise in its last stretch without a gap" * math.isnan(response.settling)
             came = f"a step from {shown(step.before, unit)}{settled}"
             sentences.append(f"{name}: {'commanded from the beginning' if math.isnan(step.before) else came}.")
-            if step.swings.verdict in UNSTABLE:
+            if step.swings.verdict in SWINGS_ON:
                 doubts.append(f"{name}: the {quantity} {fate_words(step.swings)}.")
             findings += [
                 Finding(f"{name}: {quantity} in the steady state", unit, response.final, step.commanded),
@@ -153,9 +153,7 @@ def step_section(recording: AnalysedRecording) -> Section | None:
                 Finding(f"{name}: ripple", unit, response.ripple),
             ]
         if steps:
-            worst = max(steps, key=lambda step: step.error)
-            error = f"{shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
-            shows.append(f"{many_steps(steps, f'{quantity} step')}; the largest steady error is {error}.")
+            shows.append(f"{steady_error(steps, f'{quantity} step', unit)}.")
     if not shows and not doubts:
         hint = "; name the topic of its command with --command" * (not followed)
         sentences.append(f"No step of a commanded force was recorded{hint}.")
@@ -184,7 +182,7 @@ def _tared(measured: Source, command: Source | None) -> str:
     if command is not None and len(rows):
         changed = np.any([np.diff(value) for value in command.values.values()], axis=0)
         since = force.time[rows] - command.time[1:][changed][:, np.newaxis]
-        rows = rows[~np.any((since >= 0.0) & (since < HOLD.shortest), axis=0)]
+        rows = rows[~np.any(np.abs(since) < HOLD.shortest, axis=0)]
     if not len(rows):
         return ""
     size = shown(float(np.max(np.linalg.norm(moves[:, rows], axis=0))), "N")
