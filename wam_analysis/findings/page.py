@@ -3,7 +3,7 @@
 import base64
 import hashlib
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
@@ -150,19 +150,21 @@ def _notes(findings: Sequence[Finding]) -> str:
     noted = [one for one in findings if one.note]
     if not noted:
         return ""
-    rows = "".join(f"<dt>{html.escape(one.name)}</dt><dd>{html.escape(one.note)}</dd>" for one in noted)
-    return f"<details><summary>Where the numbers come from</summary><dl>{rows}</dl></details>"
+    rows = _pairs((one.name, one.note) for one in noted)
+    return f"<details><summary>Where the numbers come from</summary>{rows}</details>"
+
+
+def _pairs(rows: Iterable[tuple[str, str]]) -> str:
+    """A list of names, each with what belongs to it."""
+    return f"<dl>{''.join(f'<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>' for name, text in rows)}</dl>"
 
 
 def _provenance(analysis: Analysis) -> str:
-    rows = "".join(f"<dt>{html.escape(k)}</dt><dd>{html.escape(v)}</dd>" for k, v in analysis.provenance.items())
-    topics = "".join(
-        f"<dt>{html.escape(name)}</dt><dd>{len(columns.log_time_ns)}</dd>"
-        for name, columns in sorted(analysis.recording.bag.topics.items())
-    )
+    topics = sorted(analysis.recording.bag.topics.items())
+    counts = _pairs((name, str(len(columns.log_time_ns))) for name, columns in topics)
     return (
-        f'<section id="provenance"><h2>Provenance</h2><dl>{rows}</dl>'
-        f"<details><summary>Messages of each topic that was read</summary><dl>{topics}</dl></details></section>"
+        f'<section id="provenance"><h2>Provenance</h2>{_pairs(analysis.provenance.items())}'
+        f"<details><summary>Messages of each topic that was read</summary>{counts}</details></section>"
     )
 
 
