@@ -135,7 +135,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
             result.append(FoundCycle(one, COMMANDED_CYCLE))
     if rest is None or command is None:
         return result
-    rate = 1.0 / max(float(np.median(np.diff(command.time))), STREAM.quickest) if len(command.time) > 1 else 0.0
+    rate = 1.0 / float(np.median(np.diff(command.time)))
     for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_period:
@@ -190,13 +190,13 @@ def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
 
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:
     """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if it is not known."""
-    time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
+    time = np.linspace(one.begin, one.end, round(40.0 * one.cycle.cycles))
     if command is None or not len(command.time) or not is_known(command, time):
         return None
     (known,) = command.values
     cycle = limit_cycle(time, held(command, known, time))
     is_small = known == quantity and cycle.peak_to_peak < CYCLE.commanded * one.cycle.peak_to_peak
-    return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
+    return 0.0 if cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 
 def _commanded_size(one: Episode, command: Source) -> float:

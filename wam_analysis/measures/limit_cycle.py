@@ -23,7 +23,6 @@ class LimitCycle(NamedTuple):
     confidence : 0 to 1: that, less the relative change of its size from the first half to the second.  It is near 0
         for noise and single transients.
     growth : size of the second half over that of the first; 1 for a limit cycle.
-    shape : (phases,), the mean cycle from its lowest phase on.
     """
 
     peak_to_peak: float
@@ -32,10 +31,9 @@ class LimitCycle(NamedTuple):
     explained: float
     confidence: float
     growth: float
-    shape: Numbers
 
 
-NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, 0.0, math.nan, np.empty(0))
+NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, 0.0, math.nan)
 
 
 def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> LimitCycle:
@@ -89,7 +87,6 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
         explained=folded.explained,
         confidence=max(0.0, folded.explained - change),
         growth=growth,
-        shape=np.roll(folded.shape, -int(np.argmin(folded.shape))) + float(np.mean(value)),
     )
 
 
@@ -156,9 +153,8 @@ def top(values: Numbers, row: int) -> float:
 
 
 class _Folded(NamedTuple):
-    """The mean cycle, its peak to peak, and the part of the variance that it explains beyond chance."""
+    """Peak to peak of the mean cycle, and the part of the variance that it explains beyond chance."""
 
-    shape: Numbers
     size: float
     explained: float
 
@@ -177,7 +173,7 @@ def _fold(flat: Numbers, phase: Numbers, phases: int, loud: float) -> _Folded:
     seen = shape[count > 0.5 * np.mean(count[known])]  # of few samples a mean is noise
     scatter = math.sqrt(min(rest, loud**2) * len(seen) / len(flat))
     size = float(np.ptp(seen)) - _luck(np.max(seen) - seen, scatter) - _luck(seen - np.min(seen), scatter)
-    return _Folded(shape, max(size, 0.0), explained)
+    return _Folded(max(size, 0.0), explained)
 
 
 def _fitted(flat: Numbers, phase: Numbers, phases: int, number: int) -> _Folded:
@@ -186,8 +182,7 @@ def _fitted(flat: Numbers, phase: Numbers, phases: int, number: int) -> _Folded:
     waves = [np.exp(np.outer(at, turn)) for at in (phase, np.arange(phases) / phases)]
     here, whole = (np.hstack([one.real, one.imag[:, 1:]]) for one in waves)
     parts = np.linalg.lstsq(here, flat)[0]
-    shape = whole @ parts
-    return _Folded(shape, float(np.ptp(shape)), _explained(flat, here @ parts, len(parts))[0])
+    return _Folded(float(np.ptp(whole @ parts)), _explained(flat, here @ parts, len(parts))[0])
 
 
 def _explained(flat: Numbers, fit: Numbers, free: int) -> tuple[float, float]:
