@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_analysis.findings.finding import Section, counted, shown, times, when
+from wam_analysis.foreign.clocks import clocks
 from wam_analysis.foreign.pieces import pieces
 from wam_analysis.foreign.source import Source, Treated
-from wam_analysis.foreign.sources import clocks_of
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -28,7 +28,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
         line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns, bag.counts.get(name, 0))
     ]
     wrong = [*(f"INCOMPLETE: {line}" for line in recording.lost), *in_words(found)]
-    wrong += [f"{name}: {note}." for name, clock in clocks_of(bag).items() for note in clock.notes]
+    wrong += [f"{name}: {note}." for name, clock in clocks(bag).items() for note in clock.notes]
     wrong += [
         f"{topic}: values jump back and forth from message to message, as if two publishers, or rows of two joints, "
         f"took turns; the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."

@@ -3,7 +3,7 @@
 import math
 import re
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from wam_analysis.findings.finding import shown, times
 from wam_analysis.foreign.topic_map import UNITS, TopicMap
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Index, Times
-from wam_bag.bag import JointColumns, WrenchColumns
+from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 BILLION = 1_000_000_000
 CLOCK_SET = "the clock of its stamps was changed, or never set; reception times are used"
@@ -90,15 +90,17 @@ def joined_times(seconds: NDArray[Any], rest: NDArray[Any]) -> NDArray[Any]:
     return BILLION * seconds + 10 ** (3 * max((9 - digits) // 3, 0)) * rest
 
 
-def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Clock]:
-    """The times of each topic, on the clock of the stamped topic with the most messages.
+def clocks(bag: Bag) -> dict[str, Clock]:
+    """The times of each topic of joints and wrenches by name, on the clock of the stamped topic with the most messages.
 
     What a message was later received than sent is the same for two topics of one clock, up to a second, and no message
     is received before it was sent.  Where it is not, the stamps are shifted by the difference, or those of a clock of
     another rate replaced by what the other clock showed at their reception.
     """
     found = {}
-    for topic, columns in topics.items():
+    for topic, columns in sorted(bag.topics.items()):
+        if not isinstance(columns, (JointColumns, WrenchColumns)) or not len(columns.stamp_ns):
+            continue
         received, notes = _unset(columns.stamp_ns, columns.log_time_ns)
         sent = rising(columns.stamp_ns, received)
         found[topic] = Clock(sent, received, notes + (CLOCK_SET,) * (not np.array_equal(sent, columns.stamp_ns)))
@@ -153,7 +155,7 @@ def rising(stamps: Times, received: Times) -> Times:
     age = received - stamps
     before, here, after = stamps[:-2], stamps[1:-1], stamps[2:]
     away = np.abs(age) > STREAM.away
-    away[0] |= keeps_pace and age[0] - age[1] > STREAM.reset
+    away[0] |= age[0] - age[1] > STREAM.reset
     is_far = np.maximum(before - here, here - after) > STREAM.near * period
     away[1:-1] |= is_far & (after - before > STREAM.changes * period)  # and its own place is empty
     if 2 * np.count_nonzero(away) < len(stamps):

@@ -3,11 +3,12 @@
 import math
 from os.path import commonpath
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from wam_analysis.foreign.clocks import Clock, clocks
+from wam_analysis.foreign.clocks import clocks
 from wam_analysis.foreign.raw_values import treated_source
 from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.source import AXES, Source
@@ -23,11 +24,12 @@ from wam_bag.columns import JOINT_FIELDS
 def sources(bag: Bag, given: TopicMap) -> list[Source]:
     """The joints of a bag, each once for each topic and sender, and the wrenches, each once for each frame, too."""
     found: list[Source] = []
-    found_clocks = clocks_of(bag)
+    found_clocks = clocks(bag)
     origin = min((int(clock.times.min()) for clock in found_clocks.values()), default=0)
-    for topic, columns in _stamped(bag).items():
+    for topic, (sent_at, received_at, _) in found_clocks.items():
+        columns: Any = bag.topics[topic]
         is_command = bag.types.get(topic) == COMMAND
-        clock, received = found_clocks[topic].times - origin, found_clocks[topic].received - origin
+        clock, received = sent_at - origin, received_at - origin
         timed: dict[bytes, Timed] = {}
         parts = _parts(columns)
         nothing = np.full(len(clock), math.nan)
@@ -45,7 +47,7 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                     continue
                 one = timed.get(of_sender.tobytes()) or timed_messages(clock, received, columns, of_sender)
                 timed[of_sender.tobytes()] = one
-                mine = (own & known if is_command or not name else own)[one.rows]
+                mine = own[one.rows]
                 rows = one.rows[mine]
                 taken = {q: v[rows] for q, v in values.items() if np.isfinite(v[rows]).any()}
                 units = {q: given.scaled(q.partition(".")[0])[1] for q in (JOINT_FIELDS if name else AXES)}
@@ -56,20 +58,6 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                     found.append(treated_source(source))
     first = min((one.sent[0] for one in found), default=0.0)  # times of reception may be later than a coarse stamp
     return _labelled([one.since(first) for one in found])
-
-
-def clocks_of(bag: Bag) -> dict[str, Clock]:
-    """The times of the topics of joints and wrenches with enough messages, by name."""
-    return clocks(_stamped(bag))
-
-
-def _stamped(bag: Bag) -> dict[str, JointColumns | WrenchColumns]:
-    return {
-        topic: columns
-        for topic, columns in sorted(bag.topics.items())
-        if isinstance(columns, (JointColumns, WrenchColumns))
-        and len(columns.stamp_ns) >= (1 if bag.types.get(topic) == COMMAND else SHAFT.fewest_samples)
-    }
 
 
 def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bool) -> list[tuple[str, Mask, Mask]]:
