@@ -12,7 +12,7 @@ class ShaftThresholds:
     motor_rest: float = 0.05  # rad/s; a slower motor is at rest
     joint_rest: float = 0.002  # rad/s or m/s; a slower joint is at rest
     shortest_phase: float = 0.01  # s; a shorter stick or slip is chatter
-    window: float = 0.03  # s over which friction is averaged
+    window: float = 0.03  # s over which friction is averaged, and at most a velocity that is made from positions
     widest_window: float = 0.24  # s, likewise, of a joint whose motions are long
     of_motion: float = 0.25  # of a motion in one direction: so much of it is averaged over
     # of a joint without velocities: standard deviations of its position, within which it stays at rest
@@ -33,7 +33,7 @@ class ShaftThresholds:
     fewest_samples: int = 20  # below which a signal is not evaluated
     fewest_signals: int = 100  # instants of all motors and joints, with fewer of which their friction is not
     agreeing: int = 3  # breakaways of which the least is taken for the highest: no single one decides
-    precise: float = 0.01  # of the torque: noise at a breakaway after the line
+    precise: float = 0.01  # of the torque, or of the largest speed: noise at a breakaway, or of a made velocity
     sigmas: float = 3.0  # standard errors by which a number may differ from its prediction, or from the truth
     neglected: float = 2e-3  # of a number: what its fit neglects, where a recording without noise leaves no error
     freedom: float = 2.0  # least degrees of freedom: with fewer, an error could be anything
@@ -267,9 +267,7 @@ class StreamThresholds:
     around: int = 2  # steps on each side that show the velocity where none was recorded
     rounding: float = 1e-9  # of the range of a signal: a smaller change is one of the arithmetic
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
-    precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
     averaged: float = 0.2  # s, over which a recorded velocity is compared with the rate of the position
-    widest: float = 0.03  # s about each sample that such a velocity is taken from
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,7 +62,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if math.isfinite(found.static.value):
             remarks.append(f"near rest, dry friction rises to about {shown(found.static.value, effort)}")
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
-        if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
+        if lag and found.inertia.is_sure:  # one that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not driven and (still := [one.label for one in moving if "effort" in one.values]):
@@ -79,8 +79,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
 
 def _acts(source: Source) -> bool:
     """Whether an effort was recorded that changes."""
-    effort = np.nan_to_num(source.values.get("effort", np.zeros(0)))
-    return bool(np.any(effort != effort[:1]))
+    return len(np.unique(source.known("effort"))) > 1
 
 
 def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:
@@ -92,7 +91,7 @@ def _lacking(one: Source, numbers: Sequence[tuple[str, str, FrictionNumber]], un
     """Which condition of an identified friction is not met."""
     if below := [number for number in numbers if number[2].is_negative]:
         return f"{_stated(below)}, as if the effort had the other sign, or something else moved the joint"
-    if "effort" not in one.values or not len(one.only(*one.values).time):
+    if "effort" not in one.values:
         return f"no message has all of {', '.join({**one.values, 'effort': 0})}"
     if not _acts(one):
         return "its effort never changes"
@@ -109,7 +108,7 @@ def limited(source: Source, quantity: str = "effort") -> str:
 
     One in coarse steps stays at its last step for 2.4 times as long as at the one before, at most, as it turns there.
     """
-    value = source.only(quantity).values.get(quantity, np.zeros(0))
+    value = source.known(quantity)
     levels, numbers = np.unique(value, return_counts=True)
     ends = [(0, 1), (-1, -2)] if len(levels) > 1 else []
     bounds = [levels[at] for at, next_to in ends if levels[at] and numbers[at] > SHAFT.turning_steps * numbers[next_to]]
@@ -241,7 +240,7 @@ def _between(one: FrictionNumber, before: FrictionNumber, after: FrictionNumber)
 def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Friction, int]:
     """The fit with the shift of the effort, samples, that leaves least unexplained; else 0, or the shift that was seen.
 
-    It must leave much less than 0 does, or clearly less, and hardly anything; of what was seen, clearly less.
+    It must leave much less than that does, or clearly less, and hardly anything.
     """
     step, best = max(1, most // 4), seen
     fits = {seen: fit(seen)}
@@ -252,7 +251,7 @@ def _best(fit: Callable[[int], Friction], most: int, seen: int = 0) -> tuple[Fri
         nearest = min(fits, key=lambda shift: fits[shift].residual)
         step, best = (step if nearest != best and step > 1 else step // 2), nearest
     is_left = fits[best].residual > SHAFT.late * abs(fits[best].dynamic.value)
-    share = SHAFT.much_better if is_left and not seen else SHAFT.better
+    share = SHAFT.much_better if is_left else SHAFT.better
     best = best if fits[best].residual < share * fits[seen].residual else seen
     return fits[best], best
 

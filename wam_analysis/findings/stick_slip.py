@@ -150,9 +150,9 @@ def _staying(piece: Piece, least: float) -> tuple[Mask, float, int]:
 
     Longer rests show slower motions.
     """
-    reach = max(SHAFT.stays * piece.noise["position"], least * STREAM.widest)
+    reach = max(SHAFT.stays * piece.noise["position"], least * SHAFT.window)
     speed = np.percentile(np.abs(piece.values["velocity"]), 95.0)
-    wait = min(max(reach / max(least, SHAFT.slow * float(speed)), STREAM.widest), SHAFT.widest_window)
+    wait = min(max(reach / max(least, SHAFT.slow * float(speed)), SHAFT.window), SHAFT.widest_window)
     rows = max(math.ceil(wait / piece.period), SHAFT.rest_samples)
     return stays(piece.values["position"], reach, rows), max(least, reach / (rows * piece.period)), rows
 

@@ -90,7 +90,7 @@ def resolution(value: Numbers, recorded: Numbers | None = None) -> float:
 
 def rests(source: Source) -> bool:
     """Whether a joint never moved, by its position: an encoder may flicker between counts."""
-    position = source.only("position").values.get("position", np.zeros(0))
+    position = source.known("position")
     if not len(position):
         return False
     sd = resolution(position)
@@ -113,8 +113,8 @@ def differentiated(time: Numbers, position: Numbers, noise: float) -> tuple[Numb
     sd = noise / period
     half = 1
     while (
-        half * period < STREAM.widest / 2.0
-        and _of_slope(sd, half) > STREAM.precise * speed
+        half * period < SHAFT.window / 2.0
+        and _of_slope(sd, half) > SHAFT.precise * speed
         and len(position) > 2 * half + 2
     ):
         half += 1

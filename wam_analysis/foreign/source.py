@@ -101,6 +101,10 @@ class Source(NamedTuple):
         """The source with other values of some quantities, and what was done to them."""
         return self._replace(values=self.values | dict(values), treated=(*self.treated, treated))
 
+    def known(self, quantity: str) -> Numbers:
+        """The numbers of a quantity, (k,)."""
+        return self.only(quantity).values.get(quantity, np.zeros(0))
+
     def since(self, first: float) -> "Source":
         """The source with times, s, from another instant on."""
         time, sent, received, away = (each - first for each in (self.time, self.sent, self.received, self.away))
