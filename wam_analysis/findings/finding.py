@@ -101,7 +101,7 @@ def shown(value: float, unit: str = "") -> str:
     if math.isnan(value):
         return "-"
     if math.isinf(value):
-        return "none" if value > 0.0 else "-none"
+        return "none"
     text = f"{value:.3g}" if 1e-3 <= abs(value) < 999.5 or value == 0.0 else f"{value:.2e}"
     text = f"{value:.0f}" if 999.5 <= abs(value) < 1e4 else text
     return f"{text} {unit}".rstrip()

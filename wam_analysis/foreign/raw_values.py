@@ -26,11 +26,12 @@ def _with_gaps(one: Source) -> Source:
         others = [np.nan_to_num(other) for name, other in one.values.items() if name != quantity]
         found = {} if one.is_command else {Treatment.ZERO: _not_filled(value, others), Treatment.HELD: held_over(value)}
         found[Treatment.SPARSE] = ~np.isfinite(value)
-        what, mask = next(((what, mask) for what, mask in found.items() if np.any(mask)), (None, None))
-        if what and mask is not None:
-            number = int(np.sum(~mask if what is Treatment.SPARSE else mask))
-            treated = Treated(what, quantity, number, len(value))
-            one = one.with_values({quantity: np.where(mask, math.nan, value)}, treated)
+        for what, mask in found.items():
+            if np.any(mask):
+                number = int(np.sum(~mask if what is Treatment.SPARSE else mask))
+                treated = Treated(what, quantity, number, len(value))
+                one = one.with_values({quantity: np.where(mask, math.nan, value)}, treated)
+                break
     return one
 
 
@@ -69,9 +70,7 @@ def _without_spikes(one: Source) -> Source:
 def _without_unfit(one: Source) -> Source:
     """A source without a velocity that is not the rate of its position."""
     factor, unfit = velocity_fit(one)
-    if one.is_command:
-        return one._replace(velocity_factor=factor)
-    if unfit:
+    if unfit and not one.is_command:
         factor, one = math.nan, one.without("velocity", unfit)
     return one._replace(velocity_factor=factor)
 

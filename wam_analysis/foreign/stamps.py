@@ -6,7 +6,7 @@ import numpy as np
 
 from wam_analysis.foreign.source import Treated, Treatment
 from wam_analysis.measures.runs import held_over
-from wam_analysis.thresholds import SHAFT, STREAM
+from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import JointColumns, WrenchColumns
 
@@ -36,15 +36,13 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
         kept = ~np.all([held_over(column) for column in numbers.T if np.ptp(column)], axis=0)
         what = Treatment.RELAYED
     twice = same & ~changed
-    again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
-    again *= 2 * np.sum(changed) < np.sum(~same)  # they are no copies where nothing moves
-    is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
+    is_seldom = np.count_nonzero(same & ~twice) <= STREAM.repeated * (of - number)
     quantum, is_few = _quantum(steps), 0 < 2 * number < of
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
     fine = STREAM.irregular * period
     own = steps[~same] if is_seldom else steps
-    if of > SHAFT.fewest_samples and quantum > fine and np.std(waits) < STREAM.paced * np.std(own):
+    if quantum > fine and np.std(waits) < STREAM.paced * np.std(own):
         treated = Treated(Treatment.REPEATED if is_few else Treatment.ROUNDED, "", number, of, quantum / 1e9)
         return _received(rows, stamps, received, treated)
     placed = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])
@@ -53,10 +51,10 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
         placed = even  # the rate was constant
     is_whole = not number and np.max(steps, initial=0) < STREAM.changes * period
     is_rounded = is_whole and np.max(np.abs(placed - stamps)) > fine
-    if not is_rounded and (is_seldom or 2 * np.sum(twice) >= number or stamps[0] == stamps[-1]):
+    if not is_rounded and (is_seldom or 2 * np.sum(twice) >= number):
         left_out = of - int(np.sum(kept))
         return Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
-    what = Treatment.BETWEEN if is_few or not quantum else Treatment.SPREAD
+    what = Treatment.SPREAD if quantum else Treatment.BETWEEN
     return Timed(rows, placed / 1e9, (Treated(what, "", number, of, quantum / 1e9),))
 
 

@@ -75,9 +75,8 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
         low, high = (low, at[1]) if with_play(at[0]) < with_play(at[1]) else (at[0], high)
     play = 0.5 * (low + high)
     loose = with_play(play)
-    if loose.rest < SHAFT.much_better * fit.rest:
-        return Following(rms, largest, loose.gain, loose.delay, loose.offset, play, loose.rest / motion)
-    return Following(rms, largest, fit.gain, fit.delay, fit.offset, 0.0, fit.rest / motion)
+    fit, play = (loose, play) if loose.rest < SHAFT.much_better * fit.rest else (fit, 0.0)
+    return Following(rms, largest, fit.gain, fit.delay, fit.offset, play, fit.rest / motion)
 
 
 def _played(path: Numbers, play: float) -> Numbers:

@@ -24,7 +24,7 @@ class FrictionNumber(NamedTuple):
     @property
     def is_sure(self) -> bool:
         """Whether a number that has to be above zero is identified."""
-        return self.value > 0.0 and self.error < SHAFT.unsure * self.value
+        return self.error < SHAFT.unsure * self.value
 
     @property
     def is_vague(self) -> bool:

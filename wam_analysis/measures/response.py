@@ -56,8 +56,7 @@ def step_response(
         return StepResponse(final, ripple)
     sd = noise(value) / abs(step)
     narrowest, width = (
-        min(math.ceil((4.0 * sd / (q * band)) ** 2), len(value) // 50 or 1)
-        for q in (CYCLE.step_loudest, CYCLE.step_quiet)
+        min(math.ceil((4.0 * sd / (q * band)) ** 2), len(value) // 50) for q in (CYCLE.step_loudest, CYCLE.step_quiet)
     )
     while True:
         part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
