@@ -26,11 +26,11 @@ def held_of(run: RecordedRun, topic: str) -> int:
     return STREAM.held
 
 
-def live_numbers(run: RecordedRun, node: str, name: str) -> list[tuple[int, float]]:
-    """Since when, ns, a number of a node had each value, from the start on; NaN where it was not recorded."""
-    key = f"{node}:{name}"
-    changes = [(since, values[key]) for since, values in run.live_values(node) if key in values]
-    every = [(0, run.parameters.nodes.get(node, {}).get(name)), *changes]
+def live_numbers(run: RecordedRun, name: str) -> list[tuple[int, float]]:
+    """Since when, ns, a number of the force loop had each value, from the start on; NaN where it was not recorded."""
+    key = f"{FORCE_LOOP}:{name}"
+    changes = [(since, values[key]) for since, values in run.live_values(FORCE_LOOP) if key in values]
+    every = [(0, run.parameters.nodes.get(FORCE_LOOP, {}).get(name)), *changes]
     return [(since, float(value) if isinstance(value, (int, float)) else np.nan) for since, value in every]
 
 

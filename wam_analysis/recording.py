@@ -20,7 +20,6 @@ from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.arrays import Mask
 from wam_bag.bag import Bag, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import CUT
-from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.status import diagnosed_name
 from wam_sim.reactions import SETTLING_TIME, RecordedReaction, RecordedStep, too_short, unassessed, watched_times
@@ -218,7 +217,7 @@ class AnalysedRecording:
     @property
     def unassessed(self) -> tuple[list[RecordedStep], str]:
         """The steps that are too short to be assessed, and that in words."""
-        settling = live_numbers(self.run, FORCE_LOOP, SETTLING_TIME)
+        settling = live_numbers(self.run, SETTLING_TIME)
         watched = watched_times(self.tasks)
         found = unassessed(self.reactions, watched, self.steps, settling)
         return found, too_short(settling, found)

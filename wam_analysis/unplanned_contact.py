@@ -9,7 +9,6 @@ from wam_analysis.held_messages import held_of, held_rows, live_numbers, step_at
 from wam_analysis.thresholds import TOUCH
 from wam_analysis.traces import NAN, Traces
 from wam_bag.arrays import Mask
-from wam_control.task.scenario import FORCE_LOOP
 from wam_description.number_text import apart
 from wam_sim.reactions import RecordedStep
 from wam_sim.recorded_commands import COMMANDS
@@ -70,7 +69,7 @@ def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[Recorde
     Where no command comes, nothing is commanded; where the bag lacks messages of one, it is not known what was planned.
     """
     is_true, lacking, allowed = traces.true.is_known, ", ".join(_lacking(run)), np.full(len(traces.stamp), NAN)
-    for since, limit in live_numbers(run, FORCE_LOOP, LIMIT):
+    for since, limit in live_numbers(run, LIMIT):
         allowed[traces.stamp >= since] = limit
     size = np.where(is_true, traces.true.size, traces.estimated.size)
     is_free, hard = ~_planned(run, traces) & (size > 0.0), dict[str, HardContact]()
