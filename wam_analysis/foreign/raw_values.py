@@ -15,9 +15,13 @@ from wam_bag.arrays import Index, Mask, Numbers
 
 
 def treated_source(one: Source) -> Source:
-    """The source without wraps and jumps of the zero, and with what is known of its gaps."""
+    """The source without wraps, jumps of the zero and an unfit velocity, and with what is known of its gaps."""
     one = _without_wraps(_with_gaps(one))
-    return _without_unfit(one if one.is_command else _without_jumps(_without_spikes(one)))
+    one = one if one.is_command else _without_jumps(_without_spikes(one))
+    factor, unfit = velocity_fit(one)
+    if unfit and not one.is_command:
+        factor, one = math.nan, one.without("velocity", unfit)
+    return one._replace(velocity_factor=factor)
 
 
 def _with_gaps(one: Source) -> Source:
@@ -65,14 +69,6 @@ def _without_spikes(one: Source) -> Source:
             treated = Treated(Treatment.SPIKES, quantity, len(rows), size=np.max(np.abs(value[rows] - mean)))
             one = one.with_values({quantity: smooth}, treated)
     return one
-
-
-def _without_unfit(one: Source) -> Source:
-    """A source without a velocity that is not the rate of its position."""
-    factor, unfit = velocity_fit(one)
-    if unfit and not one.is_command:
-        factor, one = math.nan, one.without("velocity", unfit)
-    return one._replace(velocity_factor=factor)
 
 
 def _without_jumps(one: Source) -> Source:

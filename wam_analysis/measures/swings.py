@@ -42,7 +42,7 @@ def swings(time: Numbers, value: Numbers, least: float, band: float = 0.0) -> Sw
     least : a smaller change is no swing; above the noise.
     band : an error that stays within it in the last fifth has settled; 0 for a signal that is none.
     """
-    if np.all(np.abs(value[-max(len(value) // 5, 2) :]) <= band):
+    if band and np.all(np.abs(value[-max(len(value) // 5, 2) :]) <= band):
         return Swings(Verdict.SETTLED)
     rows = turning_points(value, least)
     sizes, lengths = np.abs(np.diff(value[rows])), np.diff(time[rows])
