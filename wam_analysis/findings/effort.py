@@ -79,7 +79,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
 
 def _acts(source: Source) -> bool:
     """Whether an effort was recorded that changes."""
-    return len(np.unique(source.known("effort"))) > 1
+    effort = source.known("effort")
+    return bool(np.any(effort != effort[:1]))
 
 
 def _stated(numbers: Iterable[tuple[str, str, FrictionNumber]]) -> str:
