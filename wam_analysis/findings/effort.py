@@ -62,7 +62,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if math.isfinite(found.static.value):
             remarks.append(f"near rest, dry friction rises to about {shown(found.static.value, effort)}")
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
-        if lag and found.inertia.is_sure:  # one that is not known looks like a lead
+        if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
         sentences.append(f"{one.label}: {'; '.join(remarks)}.")
     if not driven and (still := [one.label for one in moving if "effort" in one.values]):

@@ -135,7 +135,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
             result.append(FoundCycle(one, COMMANDED_CYCLE))
     if rest is None or command is None:
         return result
-    rate = 1.0 / float(np.median(np.diff(command.time)))
+    rate = 1.0 / max(float(np.median(np.diff(command.time))), STREAM.quickest) if len(command.time) > 1 else 0.0
     for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_period:

@@ -36,7 +36,9 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
         kept = ~np.all([held_over(column) for column in numbers.T if np.ptp(column)], axis=0)
         what = Treatment.RELAYED
     twice = same & ~changed
-    is_seldom = np.count_nonzero(same & ~twice) <= STREAM.repeated * (of - number)
+    again = np.count_nonzero(np.diff(same.astype(np.int8), prepend=0) > 0)  # stamps that come more than once
+    again *= 2 * np.sum(changed) < np.sum(~same)  # they are no copies where nothing moves
+    is_seldom = max(again, np.count_nonzero(same & ~twice)) <= STREAM.repeated * (of - number)
     quantum, is_few = _quantum(steps), 0 < 2 * number < of
     firsts = np.flatnonzero(np.concatenate([[True], ~same]))
     period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)

@@ -187,7 +187,9 @@ def _require_one_run(path: Path, times: Times, series: Mapping[str, Any]) -> Non
         )
     steps = np.diff(times)
     behind = np.maximum.accumulate(times) - times > STREAM.filled * np.median(np.abs(steps)) if len(steps) else steps
-    if np.count_nonzero(behind) >= STREAM.near and np.mean(steps >= 0) >= STREAM.evenly:
+    back = np.count_nonzero(steps < -STREAM.reset)
+    is_run = np.count_nonzero(behind) >= STREAM.near and np.mean(steps >= 0) >= STREAM.evenly
+    if is_run or 0 < back <= STREAM.repeated * len(times):
         row = int(np.argmin(steps)) + 1
         raise BagError(
             f"{path}: after {row} rows the time goes back by {-steps[row - 1] / 1e9:.4g} s, as where a second "
