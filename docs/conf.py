@@ -66,7 +66,7 @@ autodoc_use_type_comments = False  # there are none; looking for them reads each
 # the sidebar of every page copies the contents of all pages: with objects in them that took a third of the build
 toc_object_entries = False
 # a mock has no `|`, so what is installed is imported
-OPTIONAL = ("rclpy", "control_msgs", "tf2_msgs", "viser", "trimesh", "distributed", "websockets")
+OPTIONAL = ("rclpy", "control_msgs", "viser", "trimesh", "distributed", "websockets")
 autodoc_mock_imports = [name for name in OPTIONAL if find_spec(name) is None]
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False

@@ -57,7 +57,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     "log_level": ("info", "least severity of what the nodes print", ["debug", "info", "warn", "error", "fatal"]),
     "tf": (
         "auto",
-        "/tf and /tf_static: by the stack where tf2_msgs is installed, or robot_state_publisher; auto: where one is",
+        "robot_state_publisher publishes /tf and /tf_static; auto: where it is installed",
         ["auto", *SWITCH],
     ),
     "frame_prefix": ("", "put before every frame of /tf; the frames in the arm's own messages have none", None),
@@ -139,13 +139,11 @@ def own_names(namespace: str, prefix: str) -> list[tuple[str, str]]:
 
 
 def transforms(configuration: Configuration, given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[Any]:
-    """The frames by the stack itself, by robot_state_publisher, or a line that states why there are none."""
+    """The frames by robot_state_publisher, or a line that states why there are none."""
     if given["tf"] == "false":
         return []
-    if importlib.util.find_spec("tf2_msgs") is not None:
-        return [program(["live", "--tf", "--namespace", namespace, f"--frame-prefix={given['frame_prefix']}"], ends)]
     if given["tf"] == "auto" and "robot_state_publisher" not in get_packages_with_prefixes():
-        return [LogInfo(msg="no /tf: install tf2_msgs (apt install ros-jazzy-tf2-msgs)")]
+        return [LogInfo(msg="no /tf: install robot_state_publisher (apt install ros-jazzy-robot-state-publisher)")]
     return [
         Node(
             package="robot_state_publisher",

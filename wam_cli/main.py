@@ -46,7 +46,6 @@ EXTRAS = {
     "dask": ("distributed", "dask"),
     "completion": ("argcomplete",),
 }  # fmt: skip
-OF_ROS = ("control_msgs", "tf2_msgs")  # of an installation of ROS alone
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -161,7 +160,7 @@ def _missing(command: str, error: ModuleNotFoundError) -> int:
     """Print how to install a module that is missing; raise the error for one of the stack or of Python itself."""
     module = (error.name or "").partition(".")[0]
     ways = {name: f"pip install 'wam_stack[{extra}]'" for extra, modules in EXTRAS.items() for name in modules}
-    ways |= {name: f"apt install ros-jazzy-{name.replace('_', '-')}" for name in OF_ROS}
+    ways["control_msgs"] = "apt install ros-jazzy-control-msgs"  # of an installation of ROS alone
     if not module or module.startswith("wam_") or module in sys.stdlib_module_names:
         raise error
     needs = f"it needs '{module}', which is not installed; install it with: {ways.get(module) or installation(module)}"

@@ -12,7 +12,7 @@
 - transmission_map: motors to joints and back, (A.5)
 - small_matrices: rotations, products of small vectors, the inverse of a matrix
 - rigid_body: kinematics and dynamics of the links
-- mjcf, urdf: the arm as a model for MuJoCo and for ROS; xml_element: their numbers; frames: its frames as transforms
+- mjcf, urdf: the arm as a model for MuJoCo and for ROS; xml_element: their numbers
 - mjcf_objects: free bodies and doors in the model for MuJoCo
 - contact_pairs: what may touch what, and the law of each contact force
 - wiring, synchroniser: declaration of a node; its inputs brought together by stamp

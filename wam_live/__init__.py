@@ -15,6 +15,5 @@
 Other programs next to a running stack:
 
 - push: a push as by hand, of `wam call push`
-- frame_publisher: /tf and /tf_static
 - trajectory_action: the action FollowJointTrajectory
 """

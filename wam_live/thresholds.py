@@ -31,7 +31,6 @@ class PageSettings:
     longest_arrow: float = 0.6  # m
     longest_head: float = 0.9  # m, beyond which the head of viser's arrow does not grow
     deeper: float = 1.8  # exponent of a colour that the lights of the page would turn into a paler one
-    depth: int = 100  # of /tf, as tf2_ros has it
     # motions and forces that the page commands
     speed: float = 0.5  # rad/s, mean of the fastest joint in a motion that the page requested
     shortest: float = 1.0  # s, of such a motion

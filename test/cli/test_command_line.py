@@ -97,7 +97,7 @@ def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     ("rclpy", "pip install 'wam_stack[ros]'"),
     ("quadprog", "pip install quadprog"),
     ("pinocchio.visualize", "pip install pin"),
-    ("tf2_msgs", "apt install ros-jazzy-tf2-msgs"),
+    ("control_msgs", "apt install ros-jazzy-control-msgs"),
 ])  # fmt: skip
 def test_a_package_that_is_missing_is_named_in_one_sentence(
     module: str, way: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

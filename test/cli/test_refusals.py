@@ -24,7 +24,6 @@ REFUSED = [
     ("identify bag --seed 0", "--seed has no effect without --excite; leave it out, or give --excite"),
     ("sweep t.csv --vary seed=1 --seed 0", "--seed has no effect without --random"),
     ("sweep t.csv --vary seed=1 --random 999999999", "argument --random: '999999999' is not allowed"),
-    ("live bag --frame-prefix left/", "--frame-prefix has no effect without --tf"),
     ("demo --port 0", "argument --port: '0' is not allowed; give a whole number from 1 to 65535"),
     ("call push outer_link nan 0 0", "argument N: 'nan' is not allowed; give a finite number, in N"),
     ("analyse bag --html none/x.html", "argument --html: cannot write none/x.html: none is no directory"),

@@ -295,23 +295,20 @@ def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
     assert whole.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
 
 
-@pytest.mark.parametrize(
-    ("option", "words"), [("trajectory_action", ["--trajectories"]), ("tf", ["--tf", "--frame-prefix", "left/"])]
-)
-def test_launch_serves_next_to_the_stack_what_has_its_type(option, words, launch_file, monkeypatch):
+def test_launch_serves_the_action_where_its_type_is_installed(launch_file, monkeypatch):
     _, start = launch_file
-    chosen = {**CHOSEN, "processes": "false", "frame_prefix": "left/"}
+    chosen = {**CHOSEN, "processes": "false"}
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace())
     for value in ("auto", "true"):
-        _, server = start({**chosen, option: value})
+        _, server = start({**chosen, "trajectory_action": value})
         assert server.cmd[1:4] == ["-m", "wam_cli.main", "live"]
         options = argparse.ArgumentParser()
         live.arguments(options)
-        assert options.parse_args(server.cmd[4:]) == options.parse_args([*words, "--namespace", "left"])
+        assert options.parse_args(server.cmd[4:]) == options.parse_args(["--trajectories", "--namespace", "left"])
         assert server.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
     assert len(start(chosen)) == 1
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    assert not any("live" in getattr(one, "cmd", []) for one in start({**chosen, option: "auto"}))
+    assert not any("live" in getattr(one, "cmd", []) for one in start({**chosen, "trajectory_action": "auto"}))
 
 
 def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(launch_file):
@@ -321,7 +318,7 @@ def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(l
         assert argument.choices is None or argument.default_value in argument.choices
     defaults = {name: argument.default_value for name, argument in declared.items()}
     whole, note = start({**defaults, "trajectory_action": "false"})
-    assert note.msg.startswith("no /tf: install tf2_msgs")
+    assert note.msg.startswith("no /tf: install robot_state_publisher")
     file = whole.cmd[whole.cmd.index("--config") + 1]
     assert Configuration.load(file).sections == Configuration.load(packaged("wam")).sections
 
@@ -344,9 +341,8 @@ def test_launch_plays_a_scenario_into_a_bag_with_values_of_its_own(launch_file, 
         start({**CHOSEN, "overrides": "gain"})
 
 
-def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_file, monkeypatch):
+def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_file):
     _, start = launch_file
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     viewers = {"record": "false", "processes": "false", "tf": "true", "rviz": "true"}
     for more, fixed, tree in (({}, "base_link", True), ({"frame_prefix": "left/"}, "left/base_link", False)):
         _, state, rviz = start(CHOSEN | viewers | more)

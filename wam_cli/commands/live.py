@@ -6,11 +6,10 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from wam_cli.options import ARM, namespace, require_option, take_port
+from wam_cli.options import ARM, namespace, take_port
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle, port_is_free, url
 from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
@@ -19,8 +18,8 @@ PATIENCE: Final = 1.0  # s, in which a page ends by itself
 LATE: Final = 30.0  # s, for which a stack waits for its page
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 NEEDS = (
-    "The page needs viser: pip install 'wam_stack[live]'. It can be opened on this computer only. --tf needs "
-    "tf2_msgs and --trajectories needs control_msgs, both from a ROS installation."
+    "The page needs viser: pip install 'wam_stack[live]'. It can be opened on this computer only. "
+    "--trajectories needs control_msgs, from a ROS installation."
 )
 
 
@@ -30,22 +29,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     where = "namespace of the stack, default: wam; or of the arm in the bag, default: the one with most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
-    way = parser.add_mutually_exclusive_group()
-    way.add_argument("--tf", action="store_true", help="instead of a page, publish the frames on /tf and /tf_static")
-    way.add_argument(
+    parser.add_argument(
         "--trajectories",
         action="store_true",
         help="instead of a page, serve the action FollowJointTrajectory, for example for MoveIt",
     )
-    parser.add_argument("--frame-prefix", help="with --tf: prefix of every frame, for example left/")
     parser.epilog = NEEDS
 
 
 def run(given: argparse.Namespace) -> int:
     """Show a running stack or a bag in the browser until Ctrl-C."""
-    require_option(given, "--tf", "--frame-prefix")
-    if given.bag is not None and (given.tf or given.trajectories):
-        raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")
+    if given.bag is not None and given.trajectories:
+        raise ValueError("--trajectories is for a running stack; leave out the bag")
     end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
     if given.bag is not None:
         return _recording(given)
@@ -53,8 +48,8 @@ def run(given: argparse.Namespace) -> int:
 
     given.namespace = given.namespace or ARM
     die_with_parent()
-    if given.tf or given.trajectories:
-        _program(given)
+    if given.trajectories:
+        _trajectories(given)
     else:
         _page(given)
     return 0
@@ -72,21 +67,14 @@ def _page(given: argparse.Namespace) -> None:
     page.run(lambda: stop.is_set)
 
 
-def _program(given: argparse.Namespace) -> None:
-    """Run what other programs of ROS use, next to the stack."""
+def _trajectories(given: argparse.Namespace) -> None:
+    from wam_live.trajectory_action import TrajectoryServer
     from wam_ros.client import run_next_to
 
-    make: Callable[[Any], Any]
-    if given.tf:
-        from wam_live.frame_publisher import FramePublisher
-
-        name, make = "frames", partial(FramePublisher, prefix=given.frame_prefix or "")
-    else:
-        from wam_live.trajectory_action import TrajectoryServer
-
-        name, make = "trajectory_action", partial(TrajectoryServer, report=_print)
     stop = Stop()
-    run_next_to(given.namespace, name, make, lambda: stop.is_set)
+    run_next_to(
+        given.namespace, "trajectory_action", lambda client: TrajectoryServer(client, _print), lambda: stop.is_set
+    )
 
 
 def _recording(given: argparse.Namespace) -> int:
