@@ -247,7 +247,8 @@ class ForceLoop:
         run = self._run
         if task is None:
             return
-        self._axes.forces.torque_sd = run.still_sd
+        if self.parameters.is_estimated:
+            self._axes.forces.torque_sd = run.still_sd
         places = [self._places(task, axis, contact, one.place) for axis, one in zip(task.axes, run.axes, strict=True)]
         sides = [one.side for one in run.axes]
         links = max(map(len, places))
