@@ -103,7 +103,8 @@ class ForceMeasurement:
         filtered = self._acceleration.step(change, own.force_filter, dt)
         self._velocity = velocity
         acceleration = np.array(filtered) if own.feedback == "joint_sensors" else None
-        sd = np.array(given.external_sd) if own.is_estimated and given.external_sd else self._torque_sd
+        stated = given.external_sd if own.is_estimated else None
+        sd = np.maximum(stated, FORCE.least_sd) if stated else self._torque_sd
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
 
     def _torque(self, own: ForceLoopParameters, given: ForceInput) -> Array:

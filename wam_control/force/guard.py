@@ -267,12 +267,12 @@ class Watch:
 
 
 def _differs(one: GuardedForces, other: GuardedForces) -> bool:
-    """Whether forces have other contacts, gains or other axes with them."""
+    """Whether forces have other contacts, gains or other axes with them, or are measured in another way."""
     if len(one.contacts) != len(other.contacts) or any(map(_is_apart, one.contacts, other.contacts)):
         return True
-    return one.others != other.others or any(
-        a.tolist() != b.tolist() for a, b in zip(one[3:5], other[3:5], strict=True)
-    )
+    if one.others != other.others or any(a.tolist() != b.tolist() for a, b in zip(one[3:5], other[3:5], strict=True)):
+        return True
+    return bool(np.abs(one.sense - other.sense).max() > GUARD.turn * np.abs(other.sense).max())
 
 
 def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:

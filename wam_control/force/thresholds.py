@@ -11,6 +11,7 @@ class ForceThresholds:
     steady_time: float = 0.1  # s, time constant of the torques that are taken as zero
     slow: float = 0.3  # rad/s of a joint: faster, torques show no payload; nor is it faster back from beyond its end
     payload_rest: float = 0.05  # of the torques at rest: what a payload may leave of them
+    least_sd: float = 1e-6  # N m, of an estimated torque: one without any error would be all that counts
     certain: float = 3.0  # standard deviations of the torques, within which they show nothing
     unexplained: float = 16.0  # chi^2 of torques above which they are not those of the force
     # direction and lever of a force
