@@ -8,10 +8,9 @@ from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contact
 from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theory_of
 from wam_analysis.findings.prediction import admitted
 from wam_analysis.findings.transmission import TransmissionFriction, transmission_friction
-from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.source import Source
 from wam_analysis.foreign.sources import alternates, shared_parts, sources
-from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.foreign.topic_map import COMMAND, NOTHING_GIVEN, TopicMap
 from wam_analysis.held_messages import live_numbers
 from wam_analysis.holds import Hold, RecordedTask, holds_of, task_forces, tasks_of
 from wam_analysis.recorded import PredictionParameters, prediction_parameters

@@ -11,8 +11,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown, times
-from wam_analysis.foreign.topic_map import UNITS, TopicMap
-from wam_analysis.thresholds import STREAM
+from wam_analysis.foreign.topic_map import COMMAND, UNITS, TopicMap
+from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Index, Times
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
@@ -99,7 +99,8 @@ def clocks(bag: Bag) -> dict[str, Clock]:
     """
     found = {}
     for topic, columns in sorted(bag.topics.items()):
-        if not isinstance(columns, (JointColumns, WrenchColumns)) or not len(columns.stamp_ns):
+        least = 1 if bag.types.get(topic) == COMMAND else SHAFT.fewest_samples
+        if not isinstance(columns, (JointColumns, WrenchColumns)) or len(columns.stamp_ns) < least:
             continue
         received, notes = _unset(columns.stamp_ns, columns.log_time_ns)
         sent = rising(columns.stamp_ns, received)

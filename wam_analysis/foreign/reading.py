@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wam_analysis.foreign.clocks import BILLION, dates, joined_times, nanoseconds
-from wam_analysis.foreign.topic_map import COMMANDED, QUANTITIES, TopicMap
+from wam_analysis.foreign.topic_map import COMMAND, COMMANDED, QUANTITIES, TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS, UNNAMED, joint_columns
@@ -30,7 +30,6 @@ FIELDS = {  # of the types that are known: suffix of the topic, and fields by qu
         for point, suffix in POINTS.items()
     ],
 }
-COMMAND = "command"
 UNORDERED = "points that go back in time, or lack values of others"  # of a trajectory
 PATH_STEP, PATH_SAMPLES = 10_000_000, 100_000  # ns between those of a trajectory's path, and how many at most
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge

@@ -10,10 +10,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from wam_analysis.foreign.clocks import clocks
 from wam_analysis.foreign.raw_values import treated_source
-from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.foreign.stamps import Timed, timed_messages
-from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.foreign.topic_map import COMMAND, TopicMap
 from wam_analysis.measures.runs import smallest
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_analysis.foreign.clocks import dates, joined_times, nanoseconds
-from wam_analysis.foreign.reading import COMMAND, checked
-from wam_analysis.foreign.topic_map import COMMANDED, QUANTITIES, UNITS, TopicMap, unit_of
+from wam_analysis.foreign.reading import checked
+from wam_analysis.foreign.topic_map import COMMAND, COMMANDED, QUANTITIES, UNITS, TopicMap, unit_of
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns

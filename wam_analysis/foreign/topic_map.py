@@ -8,6 +8,7 @@ QUANTITIES = {  # units that are shown: that of ROS, of linear joints, others
     "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"), "force": ("N",),
     "torque": ("N m",), "stamp": ("s",),
 }  # fmt: skip
+COMMAND = "command"  # the type of what another robot was commanded
 COMMANDED = "command."  # begins a quantity that was commanded, and the title of its column
 MAPPED = (*QUANTITIES, "name", *(COMMANDED + quantity for quantity in QUANTITIES if quantity != "stamp"))
 WAYS = {
