@@ -168,6 +168,8 @@ def twice() -> list[Case]:
         Case("faster", ros1, stamped(one("/js", 50.0, 0.7, 0.5, None, 10.0), lambda t: 1.08 * t), {}, "runs at 108 %"),
         Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
         Case("less of a part", sqlite, sent + without(again[:1000], bool, "effort"), expected, "the first message of"),
+        Case("few of a good clock", ros1, [s._replace(stamp=s.stamp - 5.0) for s in sent] + [
+            s._replace(topic="/x", fields={"name": ["x"], "position": [0.0]}) for s in sent[500:2000:500]], expected),
         Case("others", by_rosbags, [s._replace(stamp=sent[i - (i % 50 == 7)].stamp) for i, s in enumerate(sent)],
              expected, "60 of 3000 stamps repeat the one before"),
         Case("in bursts", by_rosbags, [s._replace(received=s.received - s.stamp % -0.07) for s in sent], expected),

@@ -529,6 +529,35 @@ def test_the_estimate_is_fed_back_if_it_is_chosen() -> None:
     assert never.error == pytest.approx(down(6.0)), "no contact is no force"
 
 
+def test_a_torque_counts_as_far_as_its_stated_error_permits() -> None:
+    own = replace(OWN, feedback="contact_estimate")
+    torques = (-4.0 * lever(POSE) + np.array([0.0, 1.0, 0.0, 0.0])).tolist()
+    for sd, exact in ([0.05, 50.0, 0.05, 0.05], True), ([0.05] * 4, False):
+        out = ask(force_loop(ARM, own), World(force=9.0), 6.0, contact=TOUCH, external=torques, external_sd=sd)
+        assert (out.measured == pytest.approx(down(4.0), abs=0.01)) == exact
+    command = ForceCommand("inner_link", (0.0, 6.0, 0.0), (0.0, 0.0, 1.5))  # without a lever of joint4
+    out = ask(force_loop(ARM, own), World(), external=STILL, external_sd=[0.0] * 4, command=command)
+    assert out.measured == pytest.approx((0.0, 0.0, 0.0))
+
+
+@pytest.mark.slow
+def test_the_guard_assesses_a_force_again_that_is_measured_with_other_weights() -> None:
+    q, place, factors = [0.0, -0.8, 0.0, 0.4], 0.4, []
+    own = replace(PACKAGED, feedback="contact_estimate")
+    commands = None, ForceCommand("inner_link", (0.0, 38.0, 0.0), (0.0, 0.0, 38.0 * place))
+    high, low = [0.0251, 0.2499, 0.0829, 0.0642], [0.0234, 0.2068, 0.0509, 0.0536]
+    for order in (high, low), (low,):
+        loop = force_loop(ARM, own)
+        for sd in order:
+            for command, periods in zip(commands, (100, 400), strict=True):
+                given = {"command": command, "external": STILL, "external_sd": sd, "posture": q}
+                for _ in range(periods):
+                    ask(loop, World(), joints=State(q, STILL, DRIVEN), **given)
+        factors.append(loop.supervision.factor)
+    assert factors[0] == pytest.approx(factors[1], rel=0.01)
+    assert factors[1] < 0.6
+
+
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 def test_tare_takes_the_steady_torques_as_zero_again_and_again(feedback: str) -> None:
     loop = force_loop(ARM, replace(OWN, feedback=feedback))

@@ -13,6 +13,7 @@ from wam_control.task.scenario_settings import Setting
 from wam_description.configuration import Configuration, packaged
 from wam_sim.recorded_run import recorded_run
 from wam_sim.simulated_bag import record
+from wam_sim.simulation import Simulation
 
 ROOT = Path(__file__).parents[2]
 HIDDEN = (
@@ -37,6 +38,14 @@ def without_ros(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         (folder / "hidden" / name / "__init__.py").write_text(code)
     path = os.pathsep.join([str(folder / "hidden"), str(ROOT)])
     return ran("-P", "-m", "wam_cli.program", *words, cwd=folder, env={**os.environ, "PYTHONPATH": path})
+
+
+def test_a_run_that_fails_ends_with_the_status_of_a_braked_arm() -> None:
+    steps = [ScenarioStep("release", 0.2, request="enable"), ScenarioStep("jump", 0.01, posture=(0.0, -2.0, 0.0, 1.0))]
+    run, modes = Simulation(Configuration.load(packaged("wam")), steps), []
+    run.listen("status", lambda _, status: modes.append(status.mode), "driver")
+    assert "turns at up to" in run.play()
+    assert modes == ["braked", "enabled", "braked"]
 
 
 @pytest.fixture(scope="module")
