@@ -46,12 +46,16 @@ class Entry(NamedTuple):
     name: str
     run: str
     shows: str
-    command: str
     seconds: Sequence[float]
     messages: int
     size: int
     sha256: Mapping[str, str]
     rows: Sequence[Shown]
+
+    @property
+    def command(self) -> str:
+        """What makes it again."""
+        return f"wam experiment {self.name} --samples make"
 
 
 def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
@@ -81,7 +85,6 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
         experiment.name,
         sample.run,
         sample.shows,
-        f"wam experiment {experiment.name} --samples make",
         list(sample.seconds),
         sum(read(bag, ()).counts.values()),
         sum(file.stat().st_size for file in files_of(bag)),
@@ -166,14 +169,14 @@ def table(entries: list[Entry]) -> str:
         begin, end = entry.seconds
         (digest,) = (value for name, value in entry.sha256.items() if name.endswith(".mcap"))
         part, size = f"`{entry.run}`, {begin:g} to {end:g} s", f"{entry.size / 1e3:.0f} kB"
-        link, command = f"[{entry.name}]({FOLDER}/{entry.name})", f"`{entry.command}`"
-        samples.append((link, entry.shows, part, str(entry.messages), size, command, f"`{digest[:16]}…`"))
+        link = f"[{entry.name}]({FOLDER}/{entry.name})"
+        samples.append((link, entry.shows, part, str(entry.messages), size, f"`{digest[:16]}…`"))
         for row in entry.rows:
             values = map(value_text, (row["predicted"], row["measured"]))
             same = "the same" if row["is_whole"] else "differs"
             quantities.append((entry.name, row["quantity"], *values, row["unit"], same))
     total = sum(entry.size for entry in entries)
-    head = "bag", "shows", "run, part of it", "messages", "size", "made by", "sha256 of the `.mcap`"
+    head = "bag", "shows", "run, part of it", "messages", "size", "sha256 of the `.mcap`"
     return (
         f"\n{markdown(head, samples)}\n{len(entries)} samples, {total / 1e6:.2f} MB together.\n\n"
         f"{markdown(('bag', 'quantity', 'predicted', 'measured', 'unit', 'whole run'), quantities)}\n"
