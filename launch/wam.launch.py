@@ -21,7 +21,7 @@ from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
 from wam_control.task.scenario import load_for, script_file
-from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.configuration import Configuration, named_file, option_values
 from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf
 from wam_ros.processors import placed_groups
@@ -109,9 +109,7 @@ def start_nodes(context: LaunchContext) -> list[Any]:
 
 def chosen(given: dict[str, str]) -> Configuration:
     """The configuration with what the arguments change; scenario and recorder are nodes of it."""
-    name = given["config"]
-    is_path = name.endswith((".yaml", ".yml"))
-    configuration = Configuration.load(Path(name).resolve() if is_path else packaged(name))
+    configuration = Configuration.load(named_file(given["config"]))
     values = option_values([text for text in given["overrides"].split(";") if text.strip()])
     values |= {"timing.mode": given["mode"]} if given["mode"] != CONFIGURED else {}
     more = []
