@@ -14,6 +14,7 @@ class PageSettings:
     delivery: float = 0.2  # s, in which the last message has arrived
     window: float = 15.0  # s of the arm's time in the plots
     silent: float = 2.0  # s without a state of the arm, after which that is reported
+    watch: float = 0.1  # s between two looks whether the arm still follows a trajectory
     feedback: float = 0.05  # s of the arm's time between two messages
     old: int = 500_000_000  # ns of the arm's time, after which a force or a contact is not shown
     # port and layout

@@ -28,7 +28,6 @@ from wam_ros.run import Closing
 
 ACTION: Final = "follow_joint_trajectory"
 TOPIC: Final = "joint_trajectory"
-WATCH: Final = 0.1  # s between two looks whether the arm still follows
 
 
 class TrajectoryServer(Closing):
@@ -50,7 +49,7 @@ class TrajectoryServer(Closing):
         )
         client.follow_statuses()
         client.listen("joint_states", self._take, "position velocity", self._refuse)
-        self._node.create_timer(WATCH, self._watch)
+        self._node.create_timer(LIVE.watch, self._watch)
         report(f"action {self._node.get_namespace().rstrip('/')}/{ACTION}")
 
     def close(self) -> None:

@@ -190,7 +190,7 @@ class Simulation:
             self._publish_sensors(stamp, driver.joint_sensors)
         self._publish_states(stamp, driver.motor_state)
         if self.nodes[SCENARIO].done:
-            self._report(stamp)
+            self._report(stamp)  # what it requested at its end
             return True
         if stamp - self._looked >= self._patience:
             self._require_progress(stamp)
