@@ -84,7 +84,6 @@ class ForceLoop:
     Attributes
     ----------
     supervision : by the guard, with what it finds, does and reports.
-    refusals : why a present command is refused, by topic; the last good one remains in use.
     events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
     """
 
@@ -98,7 +97,6 @@ class ForceLoop:
         zero = self._velocity = self._moved = np.zeros(len(arm.joints.names))
         self._pose = np.zeros(0)  # none so far
         self._pressed_at = zero + math.inf
-        self.refusals = dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self.tune(parameters)
         self._run = CommandRun((), None, arm, timing, zero, zero, zero, False)
@@ -129,6 +127,11 @@ class ForceLoop:
     def parameters(self) -> ForceLoopParameters:
         """Those in force; with guard.mode `limit` they may be lower than given."""
         return self.supervision.parameters
+
+    @property
+    def refusals(self) -> dict[str, Event]:
+        """Why a present command is refused, by topic; the last good one remains in use."""
+        return self._admission.refusals
 
     @property
     def event(self) -> Event:
@@ -186,7 +189,6 @@ class ForceLoop:
         if given.task is None and self._run.key[:1] == (TaskCommand,):
             admitted.restart(joints.position)  # the arm stays where it is
         admitted.step(own, given)
-        self.refusals = admitted.refusals
         task, key = _task(admitted.force, given.task, own)
         if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.friction_turn):
             self._begin(task, key, given.contact is not None and not contact.cover)
