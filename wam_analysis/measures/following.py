@@ -45,8 +45,8 @@ class _Fit(NamedTuple):
 def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> Following:
     """How a signal follows its command.
 
-    The command is a path that is sent in points, or it is held from message to message where that fits much better, and
-    not at the delay of a path, too, as where both are in one message: in the mean it is late by half a period.
+    The command is a path that is sent in points, or it is held from message to message where that fits much better.
+    A signal that has a sample or so in each of these steps cannot show which.
 
     Parameters
     ----------
@@ -56,14 +56,12 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     paths = [(stamps, sent), (np.repeat(stamps, 2)[1:], np.repeat(sent, 2)[:-1])]
     error = min((value - np.interp(time, *path) for path in paths), key=lambda one: float(one @ one))
     rms, largest = math.sqrt(np.mean(error**2)), float(np.max(np.abs(error)))
+    shows_steps = float(np.median(np.diff(time))) < SHAFT.much_better * float(np.median(np.diff(stamps)))
     some = slice(None, None, math.ceil(len(time) / CYCLE.compared))
     time, value = time[some], value[some]
     motion = float(np.std(value)) or math.inf
     fits = [_searched(time, value, *path) for path in paths]
-    is_held = fits[1].rest < SHAFT.much_better * fits[0].rest
-    if is_held:
-        earlier = fits[0].delay - 0.25 * float(np.median(np.diff(stamps)))
-        is_held = SHAFT.better * _fit(time, value, *paths[1], earlier).rest > fits[1].rest
+    is_held = shows_steps and fits[1].rest < SHAFT.much_better * fits[0].rest
     fit, (stamps, sent) = fits[is_held], paths[is_held]
 
     def with_play(play: float) -> _Fit:
