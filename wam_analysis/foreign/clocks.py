@@ -171,8 +171,8 @@ def rising(stamps: Times, received: Times) -> Times:
 def _sets(stamps: Times, received: Times) -> Index:
     """Rows after which the stamps go back, or skip periods that the receptions do not, and stay as much older or newer.
 
-    A message that was late does so for a moment; delays that change at random do so within their range.  Of messages
-    that waited, as for a busy recorder, the next ones come at once.
+    A message that was late does so for a moment; delays that change at random do so within their range.  Both clocks go
+    on at one pace before and after: one that was never set does not, nor do receptions of messages that had to wait.
     """
     steps = np.diff(stamps)
     skipped = (steps > STREAM.filled * np.median(steps)) & (steps > STREAM.filled * np.diff(received))
@@ -185,4 +185,4 @@ def _sets(stamps: Times, received: Times) -> Index:
     apart = np.maximum(after.min(axis=1) - before.max(axis=1), before.min(axis=1) - after.max(axis=1))
     both = np.stack([steps, np.diff(received)])
     pace = np.median(sliding_window_view(both, edge, axis=1)[:, [rows - edge, rows + 1]], axis=-1)
-    return rows[(2 * apart > np.abs(steps[rows])) & np.all(2 * pace[0] > pace[1], axis=0)]
+    return rows[(2 * apart > np.abs(steps[rows])) & np.all(2 * pace.min(axis=0) > pace.max(axis=0), axis=0)]
