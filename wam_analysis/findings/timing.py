@@ -1,7 +1,7 @@
 """Section about the timing of the loop, and the provenance of the recording."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -19,7 +19,8 @@ from wam_bag.losses import RECORDING
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
 
 
-_Stream = tuple[str, Times, Times | None, float]  # name, stamps and receptions, ns, period by the parameters, s
+# name, stamps and receptions, ns, period by the parameters, s, whether it should last for the whole recording
+_Stream = tuple[str, Times, Times | None, float, bool]
 
 
 def _own_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
@@ -31,7 +32,7 @@ def _own_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
             if timing is not None:
                 expected = timing.period if name.startswith("motor_") else timing.outer_period_ns / 1e9
             received = columns.log_time_ns if recording.mode == "realtime" else None
-            yield name, columns.stamp_ns, received, expected
+            yield name, columns.stamp_ns, received, expected, False
 
 
 def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
@@ -50,26 +51,34 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
         if len(columns.stamp_ns) > recording.bag.counts.get(topic, math.inf):
             continue  # a path of trajectories
         is_table = np.array_equal(columns.stamp_ns, columns.log_time_ns)  # or messages without stamps
-        yield name, stamp, None if is_table else received, math.nan
+        yield name, stamp, None if is_table else received, math.nan, not first.is_command
+
+
+def _silences(name: str, parts: Mapping[str, int], least: float) -> list[str]:
+    """Parts of a recording, ns, that a topic lacks, if they are longer than that, s."""
+    found = {part: shown(of / 1e9, "s") for part, of in parts.items() if of / 1e9 > least}
+    return [f"{name}: no message in the {part} {seconds} of the recording." for part, seconds in found.items()]
 
 
 def timing_section(recording: AnalysedRecording) -> Section:
     """Periods, jitter, latency and missed periods, from stamps and reception times."""
     findings, wrong = [], []
-    streams = _foreign_streams(recording) if recording.is_foreign else _own_streams(recording)
-    for name, stamp, received, expected in streams:
+    streams = list(_foreign_streams(recording) if recording.is_foreign else _own_streams(recording))
+    first, last = (f((at for _, stamp, *_ in streams for at in stamp[[0, -1]].tolist()), default=0) for f in (min, max))
+    for name, stamp, received, expected, should_last in streams:
         times, rows = np.unique(stamp, return_index=True)
         steps = np.diff(times).astype(np.float64)
         periods = usual_steps(steps) if len(steps) else np.full(1, math.nan)
         period, slowest = median(steps) / 1e9, float(np.max(periods)) / 1e9
-        lost, gap, backwards = missed(times, periods), float(np.max(np.diff(stamp))) / 1e9, np.sum(np.diff(stamp) <= 0)
+        lost, backwards = missed(times, periods), np.sum(np.diff(stamp) <= 0)
+        longest = int(np.argmax(np.diff(stamp)))
+        gap, begin = float(np.diff(stamp)[longest]) / 1e9, (stamp[longest] - first) / 1e9
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * period, 1e3 * expected),
             Finding(f"{name}: missed periods", "", lost),
             Finding(f"{name}: longest gap between stamps", "s", gap),
         ]
-        if backwards:
-            findings.append(Finding(f"{name}: stamps that do not increase", "", float(backwards)))
+        findings += [Finding(f"{name}: stamps that do not increase", "", float(backwards))] * bool(backwards)
         if received is not None and np.ptp(received) > STREAM.live * np.ptp(stamp):  # of no file that was converted
             waits = np.diff(np.sort(received)) / 1e9
             usual = np.diff(received[rows])[steps <= STREAM.changes * periods] / 1e9  # with no message missing
@@ -95,7 +104,10 @@ def timing_section(recording: AnalysedRecording) -> Section:
             what = "irregular stamps, missing messages are not known"
             if lost > 0.0:
                 what = f"{counted(int(lost), 'message')} missing"
-            wrong.append(f"{name}: {what}; longest gap: {shown(gap, 's')}.")
+            wrong.append(f"{name}: {what}; longest gap: {shown(gap, 's')} from {begin:.2f} s.")
+        if should_last and lost >= 0.0:
+            least = max(STREAM.reset / 1e9, STREAM.filled * period)
+            wrong += _silences(name, {"first": stamp[0] - first, "last": last - stamp[-1]}, least)
     silent = "No message is missing." if findings else "No stamped topic was recorded."
     sentences = wrong or [silent] * (recording.is_foreign or not findings)  # ours lists what is lost
     if timed := [facts for facts in recording.loop if RATE in facts]:
