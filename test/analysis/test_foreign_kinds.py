@@ -141,10 +141,16 @@ def coarse() -> list[Case]:
         ("parts of a float", by_mcap_ros2, 125.0, lambda t: math.floor(2048.0 * t) / 2048.0),
         ("set forward", sqlite, 100.0, lambda t: t + 0.4 * (t > 11.0)),
     ]
+    unset = [s._replace(stamp=-1.7e9) for s in one("/joint_states", 50.0, 0.7, 0.5)]
+    stall = [s._replace(received=max(s.received, 12.25 + 7e-5 * i) if 12.0 < s.received < 12.3 else s.received)
+             for i, s in enumerate(unset)]  # fmt: skip
+    gap = [s for s in unset if not 15.01 < s.received < 17.39]
     return [
-        Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
-             sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate}, "reception times are used")
-        for name, write, rate, change in made
+        *(Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
+               sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate}, "reception times are used")
+          for name, write, rate, change in made),
+        *(Case(f"never set, {what}", write, those, FRICTION | {"/joint_states: missed periods": lost}, "reception")
+          for what, write, those, lost in (("a stall", ros1, stall, 0.0), ("a gap", sqlite, gap, 119.0))),
     ]  # fmt: skip
 
 
@@ -227,8 +233,9 @@ def names() -> list[Case]:
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
         Case("long effort", by_rosbags, long, numbers("x", "y"), "effort of another length than the names"),
-        Case("effort of one", ros1, one("/js", 100.0, 0.7, 0.5) + called("x", "y"), FRICTION | numbers("x", "y"), "",
-             NOTHING, ("x: friction is not identified: no message has all of position, effort.",)),
+        Case("effort of one", ros1, one("/js", 100.0, 0.7, 0.5, None, 20.0) + called("x", "y"),
+             FRICTION | numbers("x", "y"), "", NOTHING,
+             ("x: friction is not identified: no message has all of position, effort.",)),
         Case("nothing now and then", ros1, without(called("x", "y"), lambda i: i % 9 == 4, "position"),
              numbers("x", "y"), "messages with no value", NOTHING, ("1778 messages; joints",)),
     ]  # fmt: skip
@@ -316,8 +323,13 @@ def follows() -> list[Case]:
     both = time + 4e-4 * np.random.default_rng(5).random(len(time))
     alike = [s for topic, late in (("/js", 0.04), ("/cmd", 0.0)) for s in joints(
         topic, both, ["a"], position=np.interp(time - late, time, path(time))[:, None])]  # fmt: skip
+    coarse = time[::2]
+    shaken = coarse + 3e-4 * np.random.default_rng(6).random(len(coarse))
+    locked = [*joints("/js", coarse, ["a"], position=path(coarse - 0.016)[:, None]),
+              *joints("/cmd", shaken, ["a"], position=path(coarse)[:, None])]  # fmt: skip
     return [
         Case("by whole periods", ros1, alike, {"a position: delay": 0.04, "a position: gain": 1.0}, "", to),
+        Case("by two periods", sqlite, locked, {"a position: delay": 0.01585, "a position: gain": 1.0}, "", to),
         *(Case(f"a clock {by:g} s off", sqlite, [s._replace(stamp=s.stamp + by * (s.topic == topic))
                for s in joint(path(time), path(time - 0.03))], {"a position: delay": 0.03 - min(by, 0.0)}, told, to)
           for topic, by, told in (("/cmd", 0.35, "/cmd: stamps 0.35 s ahead"), ("/js", 0.6, "/js: stamps 0.6 s ahead"),
@@ -384,7 +396,13 @@ def still() -> list[Case]:
         return Case(f"{count:g}, {noise:g}", write, sent, FRICTION, "", NOTHING, ("b: never moved.",))
 
     times = np.arange(6000) / 200.0 + 2e-4 * np.random.default_rng(1).random(6000)
+    hum = 2.0 + 0.8 * np.sin(38.0 * math.pi * times)[:, None]
+    pressed = wrenches("/f", times[1000:4000], np.ones((3000, 3)))
     return [
+        Case("a hum", by_rosbags, joints("/s", times, ["a"], position=0.0 * hum, effort=hum),
+             {"a effort, 19 Hz: amplitude": 0.8}, "", NOTHING, ("a effort, 19 Hz: vibrates at rest",)),
+        *(Case(f"not in the {part}", sqlite, joints("/s", times, ["a"], position=0.0 * hum) + pressed, {},
+               f"/f: no message in the {part} {seconds} s of the") for part, seconds in (("first", 5), ("last", 10))),
         Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),
              {"a: frequency": 0.3}, "", NOTHING, ("a: moved by 0.00614 rad, more slowly than 0.0185 rad/s, or",)),
         *(with_flicker(*each) for each in ((by_rosbags, 1, 1e-4, 0.0), (sqlite, 2, 1e-3, 1e-4), (ros1, 3, 2e-5, 1e-3),
