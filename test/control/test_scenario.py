@@ -79,7 +79,10 @@ def test_the_next_path_goes_on_where_the_last_one_ended_even_if_the_arm_is_elsew
     assert np.max(steps) < 0.04, "no jump anywhere"
 
 
-@pytest.mark.parametrize("last", [ScenarioStep("lift off", 1.0, tuple(START)), ScenarioStep("rest", 1.0)])
+@pytest.mark.parametrize("last", [
+    ScenarioStep("lift off", 1.0, tuple(START)), ScenarioStep("rest", 1.0),
+    ScenarioStep("let go", 1.0, force=ForceCommand("outer_link", (0.0, 0.0, 0.0))),
+])  # fmt: skip
 def test_after_pressing_the_path_starts_from_the_measured_pose(last: ScenarioStep) -> None:
     scenario = Scenario([ScenarioStep("go", 0.1, tuple(GOAL)), ScenarioStep("press", 0.1, force=PRESS), last])
     play(scenario, 40)
@@ -87,7 +90,7 @@ def test_after_pressing_the_path_starts_from_the_measured_pose(last: ScenarioSte
     out = play(scenario, 1, q=sunk)[0]
     assert out.step == last
     assert out.posture == sunk
-    assert out.force == NO_FORCE
+    assert out.force == last.force
 
 
 def test_between_two_forces_the_posture_stays() -> None:

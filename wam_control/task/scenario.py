@@ -133,7 +133,7 @@ class ScenarioStep(NamedTuple):
     @property
     def presses(self) -> bool:
         """Whether a force or a task is commanded, which moves the arm away from the posture."""
-        return self.force != NO_FORCE or self.task is not None
+        return any(self.force.force) or self.task is not None
 
     @property
     def commands_arm(self) -> bool:
