@@ -189,3 +189,18 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
             causes.append(str(loop.event.cause))
     assert causes == ["moved_fast"]
     assert not loop.event.holds
+
+
+@pytest.mark.slow
+def test_a_mass_that_the_arm_showed_before_it_touched_is_no_force() -> None:
+    """10 N were 13 N with 0.3 kg, commanded while the arm came down on the surface."""
+    steps = [
+        ScenarioStep("release", 0.3, request="enable"),
+        ScenarioStep("above", 1.2, posture=(0.0, -1.8, 0.0, 1.45)),
+        ScenarioStep("lower", 3.0, posture=(0.0, -2.1, 0.0, 1.45), until_force=1.5),
+        ScenarioStep("press", 1.0, force=ForceCommand("outer_link", (0.0, -10.0, 0.0))),
+    ]
+    load = {"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": [0.0, 0.6]}
+    run = Simulation(CONFIGURATION.with_values(load), steps)
+    assert not run.play()
+    assert "a load that is not in the model" in run.unmet

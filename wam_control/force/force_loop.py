@@ -181,7 +181,7 @@ class ForceLoop:
         contact = given.contact or NO_CONTACT
         # a spring to which a force counts only from where it is certain would swing about there
         springs = given.task is not None and any(axis.stiffness for axis in given.task.axes)
-        self._measurement.step(own, given, bool(contact.cover) or self._run.is_touching or springs)
+        self._measurement.step(own, given, self._run.is_touching or springs)
         topic = "force_command" if given.task is None else "task_command"
         if given.task is None and given.torque is not None and own.mode != "open_loop":
             topic, torques = "joint_torque_command", joint_axes(AxisKind.FORCE, given.torque)
@@ -233,10 +233,10 @@ class ForceLoop:
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
         before, still_sd, resting = self._run, measurement.torques.sd, np.zeros(len(self._velocity))
         is_zeroed = task is not None and bool(limit)
-        if is_zeroed and self._has_left and measurement.speed < MOTION.at_rest:
-            if is_free:
+        if is_zeroed and self._has_left:
+            if is_free and measurement.speed < MOTION.at_rest:
                 measurement.zero(limit)
-            resting = measurement.resting
+            resting = measurement.before
         is_moving = is_zeroed and measurement.speed > FORCE.slow
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.go_on(before)

@@ -64,15 +64,13 @@ class ForceMeasurement:
 
     def __init__(self, body: RigidBody) -> None:
         self._body = body
-        self._none = np.zeros(len(body.arm.joints.names))
-        self._tare = self._zero = Zero(0.0, self._none)
-        self.free = self._none
+        self.free = self._torque_sd = none = self._none
+        self._tare = self._zero = self._before = Zero(0.0, none)
         self._q: Sequence[float] = ()
-        self._torque_sd = self._none
         self._velocity = list[float]()
         self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
         self.rested, self.speed = 0.0, math.inf
-        self.torques = WorldTorques(self._none, self._none, None, self._none)
+        self.torques = WorldTorques(none, none, None, none)
         self.restart()
 
     def restart(self, torques: Sequence[float] = ()) -> None:
@@ -80,7 +78,7 @@ class ForceMeasurement:
         self._filter = LowPass(torques)
         self.torques = self.torques._replace(now=self._none, before=self._none, acceleration=None)
 
-    def step(self, own: ForceLoopParameters, given: ForceInput, is_touched: bool) -> None:
+    def step(self, own: ForceLoopParameters, given: ForceInput, is_pressing: bool) -> None:
         """Take the signals of one outer period.
 
         Parameters
@@ -88,12 +86,14 @@ class ForceMeasurement:
         own : `feedback` chooses the signal.  joint_sensors: at rest, the torque that carries the links less the strain.
             joint_position: deflection of a known spring, section 5.6.
         given : signals, and the outer period.
-        is_touched : whether a contact is known; without one, estimated torques count as zero.
+        is_pressing : whether the arm presses; without that or another contact, estimated torques count as zero.
         """
+        is_touched = is_pressing or bool(given.contact and given.contact.cover)
         dt, torque = given.dt, self._torque(own, given)
         self._q, self._torque_sd = given.joints.position, self._none + own.sensing_fed_back.torque_sd
         self.speed = max(map(abs, self._speed.step(given.joints.velocity, FORCE.steady_time, dt)))
-        self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
+        rests = self.speed < MOTION.at_rest and any(given.joints.effort)  # brakes hold what is not measured
+        self.rested = self.rested + dt if rests else 0.0
         self._steady.step(torque.tolist(), FORCE.steady_time, dt)
         is_first = not self._filter.value
         counted = torque - self._zeros if is_touched or not own.is_estimated else self._none
@@ -106,6 +106,15 @@ class ForceMeasurement:
         stated = given.external_sd if own.is_estimated else None
         sd = np.maximum(stated, FORCE.least_sd) if stated else self._torque_sd
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
+        if self.rested > FORCE.friction_turn and not is_pressing:
+            steady = np.array(self._steady.value)
+            seen = self._taken(steady)
+            if np.all(np.abs(torque - steady) < FORCE.certain * self._torque_sd) and (seen.mass or not is_touched):
+                self._before = seen
+
+    @property
+    def _none(self) -> Array:
+        return np.zeros(len(self._body.arm.joints.names))
 
     def _torque(self, own: ForceLoopParameters, given: ForceInput) -> Array:
         sensors = given.sensors
@@ -139,6 +148,16 @@ class ForceMeasurement:
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         return np.array(self._steady.value) - self._zeros
+
+    @property
+    def before(self) -> Array:
+        """Torques of the world on the joints (n,), N m, of the arm at rest before it touched, less tare and zero.
+
+        Without a load they are those of now, if it rests now.
+        """
+        if self.speed < MOTION.at_rest and not self._before.mass:
+            return self.resting
+        return self._before.at(self._body, self._q) - self._zeros
 
     def zero(self, limit: float) -> None:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m."""
