@@ -104,8 +104,6 @@ def opened(path: Path) -> Iterator[BagFile]:
 def _explain(path: Path, error: Exception) -> str:
     with path.open("rb") as stream:
         start = stream.read(len(MAGIC))
-    if not start:
-        return f"{path} is empty, nothing was recorded; record again"
     if start != MAGIC:
         return f"{path} is not MCAP; give a bag recorded with storage 'mcap'; if it is compressed, give its directory"
     if isinstance(error, NotClosedError):

@@ -20,7 +20,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Message, Schema, Statistics
 
-from wam_bag.errors import Damage, NotClosedError, TooLargeError
+from wam_bag.errors import BagError, Damage, NotClosedError, TooLargeError
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import (
     FIRST_PRIVATE,
@@ -133,6 +133,8 @@ class McapFile(BagFile):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
+        if not path.stat().st_size:
+            raise BagError(f"{path} is empty, nothing was recorded; record again")
         with path.open("rb") as stream:
             self._data: bytes | mmap.mmap = self.enter_context(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
         self.size = len(self._data)
