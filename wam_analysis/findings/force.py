@@ -224,6 +224,6 @@ def _cycle_findings(one: HeldForce, theory: Theory) -> Iterator[Finding]:
         guard, surface = theory.guarded.assessment, shown(theory.guarded.surface, "N/m")
         note = f"domain {guard.domain}; stability guard, contact of {surface}"
         yield Finding(f"{name}: gain margin (up to {GUARD.largest_scale:g})", "", math.nan, guard.scale, note)
-    if (size := predicted.actuator_peak_to_peak) > 0.0:
+    if 0.0 < (size := predicted.actuator_peak_to_peak) < math.inf:
         label = f"{name}: cycle of the motors due to Coulomb friction, at the contact, peak to peak"
         yield Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)")
