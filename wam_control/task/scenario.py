@@ -38,7 +38,7 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force of the arm on the world, N. `frame` is "
     "`base` or a cover. Optional: `contact_position`, m along the cover, if `frame` is the cover and the force is "
-    "at right angles to it; `rise`, rise time of the force, s",
+    "nearly at right angles to it; `rise`, rise time of the force, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "torque of each joint on the world, N m; the scenario sends it as a `task`",
     "until_force": "force, N. The step ends when a contact with this force is detected, and fails if there is none. "
