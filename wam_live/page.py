@@ -48,9 +48,9 @@ def free_port(wanted: int | None, notify: Callable[[str], None]) -> int:
     wanted : the one of an option; None takes `port`, or the next one that is free.
     notify : called with a line for people where `port` was not free.
     """
-    if wanted is not None or port_is_free(LIVE.port):
-        return LIVE.port if wanted is None else wanted
-    port = next(filter(port_is_free, range(LIVE.port + 1, LIVE.port + LIVE.ports)), LIVE.port)
+    if wanted is not None:
+        return wanted
+    port = next(filter(port_is_free, range(LIVE.port, LIVE.port + LIVE.ports)), LIVE.port)
     if port != LIVE.port:
         notify(
             f"port {LIVE.port} is taken by another program, perhaps the page of another arm; this page is at "
