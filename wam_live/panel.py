@@ -98,9 +98,10 @@ class Controls:
         if live is not None:
             self._add_buttons()  # above all that changes its height
         self._status = gui.add_html(boxed(status_page(Snapshot()), LIVE.status_height))
-        self._shown = gui.add_html(boxed(paragraph(HINT), LIVE.note_height) if live is not None else "")
+        self._shown = gui.add_html("")
         gui.add_html(legend(LEGEND if live is not None else LEGEND[:-1]))
         if live is not None:
+            self.notify(HINT)
             self._add_press(arm)
             self._add_scenario()
         self._force_plot = self._add_plot(FORCE_TITLE, FORCES, LIVE.ranges[0])
