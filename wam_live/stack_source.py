@@ -40,9 +40,7 @@ class RunningStack:
         self.node = Node("live_view", context=context, namespace=namespace)
         self._covers = shared.arm.covers.names
         self._topics = {name: self._subscription(name) for name in TOPICS}
-        self._decoders = {
-            name: decoder(BY_NAME[name], shared, "position?" if "joint" in name else "") for name in TOPICS
-        }
+        self._decoders = {name: decoder(BY_NAME[name], shared, "position?") for name in TOPICS}
         self._newest: dict[str, tuple[int, Any]] = {}
         self._pace: tuple[float, int] = (time.monotonic(), 0)
         self._factor = NAN
