@@ -12,7 +12,7 @@ from typing import Any, Final
 import rclpy
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.time import Time
+from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from wam_control.task.motion import Moving
@@ -23,7 +23,7 @@ from wam_description.topics import BY_NAME
 from wam_live.thresholds import LIVE
 from wam_ros.client import StackClient
 from wam_ros.messages import Refused, WrongNames, read_trajectory
-from wam_ros.ros_topics import header, qos
+from wam_ros.ros_topics import header, qos, stamp_of
 from wam_ros.run import Closing
 
 ACTION: Final = "follow_joint_trajectory"
@@ -102,7 +102,7 @@ class TrajectoryServer(Closing):
         except Refused as refusal:
             code = GoalCode.INVALID_JOINTS if isinstance(refusal, WrongNames) else GoalCode.INVALID_GOAL
             return GoalEnd(code, str(refusal))
-        if Time.from_msg(goal.trajectory.header.stamp).nanoseconds > self._stamp > 0:
+        if stamp_of(goal.trajectory) > self._stamp > 0:
             return GoalEnd(GoalCode.INVALID_GOAL, "header.stamp is in the future; send 0, the arm starts at once")
         self._end(GoalEnd(GoalCode.INVALID_GOAL, "a newer goal took its place"))
         if self._client.is_published(TOPIC):
@@ -149,13 +149,12 @@ class TrajectoryServer(Closing):
         desired, actual = goal.desired, Moving(joints.position, joints.velocity)
         assert desired is not None
         error = Moving(*([b - a for a, b in zip(*pair, strict=True)] for pair in zip(actual, desired, strict=True)))
-        points = []
-        for one in (desired, actual, error):
-            points.append(point := JointTrajectoryPoint(positions=one.position, velocities=one.velocity))
-            point.time_from_start.sec = int(goal.time)
-            point.time_from_start.nanosec = int(goal.time % 1.0 * 1e9)
-        feedback = FollowJointTrajectory.Feedback(joint_names=self._names)
-        feedback.header.stamp = header(stamp).stamp
+        time = Duration(seconds=goal.time).to_msg()
+        points = [
+            JointTrajectoryPoint(positions=one.position, velocities=one.velocity, time_from_start=time)
+            for one in (desired, actual, error)
+        ]
+        feedback = FollowJointTrajectory.Feedback(header=header(stamp), joint_names=self._names)
         feedback.desired, feedback.actual, feedback.error = points
         return feedback
 
