@@ -37,6 +37,7 @@ from wam_bag.columns import (
 from wam_bag.errors import BagError, Damage
 from wam_bag.losses import PARAMETERS, RECORDING, Losses, losses
 from wam_bag.mcap_file import BagFile
+from wam_bag.mcap_records import MessageCounts, together
 from wam_bag.message_search import NEVER
 from wam_bag.message_text import full_name
 
@@ -170,7 +171,7 @@ def read(
             f"{path} is to be read from {begin_ns} ns to {end_ns} ns; the end must not be before the start"
         )
     collectors: dict[str, Collector] = {}
-    counts, types, times, unread = Counter[str](), dict[str, str](), list[int](), set[str]()
+    counts, types, every, unread = Counter[str](), dict[str, str](), list[MessageCounts](), set[str]()
     attachments, metadata = dict[str, bytes](), dict[str, dict[str, str]]()
     for one in files(Path(path)):
         with opened(one) as file:
@@ -183,10 +184,9 @@ def read(
                     collector.add(batch)
                 except Damage as error:
                     raise Damage(f"topic {channel.topic}: {error}") from None
-            listed = file.counts or file.loaded
-            times += [listed.first, listed.last][: 2 * any(listed.by_channel.values())]
+            every.append(listed := file.counts or file.loaded)
             for number, channel in file.channels.items():
-                counts[channel.topic] += listed.by_channel.get(number, 0)
+                counts[channel.topic] += listed.by_channel[number]
                 schema = file.schemas.get(channel.schema_id)
                 kind = full_name(schema.name) if schema else "?"
                 if channel.topic not in types and channel.message_encoding not in ENCODINGS:
@@ -204,9 +204,9 @@ def read(
         _require(path, topics, types)
     columns = _Topics({t: one.columns(f"{path}, topic {t}") for t, one in sorted(collectors.items())})
     types |= {topic: one.kind.name for topic, one in collectors.items()}
-    ends = min(times, default=0), max(times, default=0)
+    first, last, _ = together(every)
     return Bag(
-        Path(path), columns, dict(sorted(types.items())), attachments, metadata, counts, *ends, frozenset(unread)
+        Path(path), columns, dict(sorted(types.items())), attachments, metadata, counts, first, last, frozenset(unread)
     )
 
 

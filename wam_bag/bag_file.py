@@ -153,8 +153,8 @@ def parts(
     if file.counts is None or is_part:
         return
     for number, channel in file.channels.items():
-        expected = file.counts.by_channel.get(number, 0)
-        found_in = file.loaded.by_channel.get(number, 0)
+        expected = file.counts.by_channel[number]
+        found_in = file.loaded.by_channel[number]
         if is_selected(channel.topic, topics) and found_in != expected:
             raise Damage(f"topic {channel.topic} has {found_in} messages instead of {expected}")
 

@@ -10,8 +10,7 @@ import math
 import os
 import shutil
 import time
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Final, NamedTuple, Self
@@ -22,8 +21,9 @@ from wam_bag import safe_yaml
 from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
 from wam_bag.errors import RecordingError, command
+from wam_bag.mcap_records import MessageCounts, together
 from wam_bag.mcap_writer import FAST, McapWriter
-from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
+from wam_bag.metadata import LIBRARY, bag_information, topic_information, write_metadata
 
 __all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "release"]
 
@@ -78,10 +78,9 @@ class BagWriter:
         self._packing = chunk_size, level
         self._largest = split.size or math.inf  # bytes of a file
         self._longest = round(split.seconds * 1e9) or math.inf  # ns in a file
-        self._files: list[FileSummary] = []
+        self._files: dict[str, MessageCounts] = {}  # that are finished
         self._topics: dict[str, tuple[Channel, Schema]] = {}
         self._lengths: dict[str, ExactLength] = {}
-        self._counts: Counter[int] = Counter()  # by channel id, of the files that are finished
         self._schemas: dict[str, Schema] = {}
         self._next_flush = 0.0
         self._file_begin: int | None = None
@@ -196,7 +195,7 @@ class BagWriter:
     @property
     def written(self) -> int:
         """Messages on disk."""
-        return sum(self._counts.values()) + sum(self._writer.counts.values())
+        return together([*self._files.values(), self._writer.counts]).by_channel.total()
 
     def close(self) -> None:
         """Finish the bag and write ``metadata.yaml``; nothing happens the second time.
@@ -236,15 +235,11 @@ class BagWriter:
 
     def _finish_file(self) -> None:
         writer = self._writer
-        file = FileSummary(self._file_name(), writer.first, writer.last, sum(writer.counts.values()))
-        counts = self._counts + Counter(writer.counts)
-        information = self._information([*self._files, file], counts)
-        writer.metadata("rosbag2", {"serialized_metadata": safe_yaml.dump(information).strip()})
+        files = {**self._files, self._file_name(): writer.counts}
+        writer.metadata("rosbag2", {"serialized_metadata": safe_yaml.dump(self._information(files)).strip()})
         writer.finish()
         self._stream.close()
-        self._files.append(file)
-        self._counts = counts
-        writer.counts = {}
+        self._files, writer.counts = files, MessageCounts()
 
     @contextlib.contextmanager
     def _closing_on_failure(self) -> Iterator[None]:
@@ -276,11 +271,11 @@ class BagWriter:
                 self._finish_file()
         finally:
             self._stream.close()
-        write_metadata(self.path, self._information(self._files, self._counts))
+        write_metadata(self.path, self._information(self._files))
 
-    def _information(self, files: Sequence[FileSummary], counts: Counter[int]) -> dict[str, Any]:
-        topics = [topic_information(*records) for records in self._topics.values()]
-        return bag_information(files, topics, [counts[channel.id] for channel, _ in self._topics.values()])
+    def _information(self, files: Mapping[str, MessageCounts]) -> dict[str, Any]:
+        topics, counts = [topic_information(*records) for records in self._topics.values()], together(files.values())
+        return bag_information(files, topics, [counts.by_channel[channel.id] for channel, _ in self._topics.values()])
 
 
 def _reserve(path: Path) -> BinaryIO:

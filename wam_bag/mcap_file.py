@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import zstandard
@@ -31,12 +31,14 @@ from wam_bag.mcap_records import (
     MAGIC,
     MESSAGE,
     ChunkPlace,
+    MessageCounts,
     RecordExtent,
     checked,
     chunk_index,
     decompress,
     expanded,
     parsed,
+    together,
     walk,
 )
 from wam_bag.message_search import NEVER, TAIL, MessageBatch, find
@@ -47,14 +49,6 @@ _OF_DATA: Final = {
     Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT,
     Opcode.METADATA,
 }  # fmt: skip
-
-
-class MessageCounts(NamedTuple):
-    """First and last log time of the messages in ns, 0 if there are none, and messages by channel id."""
-
-    first: int
-    last: int
-    by_channel: dict[int, int]
 
 
 class BagFile(contextlib.ExitStack):
@@ -82,7 +76,7 @@ class BagFile(contextlib.ExitStack):
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: MessageCounts | None = None
-        self.loaded = MessageCounts(0, 0, {})
+        self.loaded = MessageCounts()
 
     def open(self) -> None:
         """Find the parts of a closed file."""
@@ -114,12 +108,9 @@ class BagFile(contextlib.ExitStack):
 
     def _taken(self, batch: MessageBatch) -> MessageBatch:
         """The batch, whose messages are counted."""
-        before, times = self.loaded, batch.times
-        messages = dict(enumerate(np.bincount(batch.channels).tolist()))
-        if messages:
-            first = min([int(times.min()), *([before.first] if before.by_channel else [])])
-            counts = Counter(before.by_channel) + Counter(messages)
-            self.loaded = MessageCounts(first, max(before.last, int(times.max())), counts)
+        if len(times := batch.times):
+            messages = Counter(dict(enumerate(np.bincount(batch.channels).tolist())))
+            self.loaded = together([self.loaded, MessageCounts(int(times.min()), int(times.max()), messages)])
         return batch
 
 
@@ -242,7 +233,7 @@ class McapFile(BagFile):
         self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
     ) -> Iterator[MessageBatch]:
         """See `BagFile.batches`."""
-        self.loaded = MessageCounts(0, 0, {})
+        self.loaded = MessageCounts()
         pending: list[ChunkPlace] = []
         size = whole = 0
         wanted = [
@@ -308,7 +299,7 @@ class McapFile(BagFile):
             elif opcode == Opcode.STATISTICS:
                 found: Statistics = parsed(opcode, content)
                 self.counts = MessageCounts(
-                    found.message_start_time, found.message_end_time, found.channel_message_counts
+                    found.message_start_time, found.message_end_time, Counter(found.channel_message_counts)
                 )
         return chunks, others
 

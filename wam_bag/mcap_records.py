@@ -6,7 +6,8 @@ its content.
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from io import BytesIO
 from mmap import mmap
 from typing import Any, Final, NamedTuple
@@ -66,6 +67,21 @@ def serialized(record: records.McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()  # type: ignore[no-untyped-call]
+
+
+class MessageCounts(NamedTuple):
+    """First and last log time of some messages in ns, 0 if there are none, and their numbers by channel id."""
+
+    first: int = 0
+    last: int = 0
+    by_channel: Counter[int] = Counter()  # noqa: RUF012 - never changed
+
+
+def together(parts: Iterable[MessageCounts]) -> MessageCounts:
+    """Several counts as one; of several files, channel ids differ."""
+    filled = [one for one in parts if any(one.by_channel.values())]
+    first, last = min((one.first for one in filled), default=0), max((one.last for one in filled), default=0)
+    return MessageCounts(first, last, sum((one.by_channel for one in filled), Counter()))
 
 
 class RecordExtent(NamedTuple):

@@ -10,6 +10,7 @@ import contextlib
 import os
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Mapping
 from io import FileIO
 from typing import Final
@@ -19,7 +20,7 @@ import zstandard
 from mcap import records
 from mcap.opcode import Opcode
 
-from wam_bag.mcap_records import FOOTER_SIZE, HEAD, MAGIC, MESSAGE, serialized
+from wam_bag.mcap_records import FOOTER_SIZE, HEAD, MAGIC, MESSAGE, MessageCounts, serialized, together
 
 FAST: Final = 3
 _OPCODE: Final = int(Opcode.MESSAGE)  # packed faster than the enumeration
@@ -43,14 +44,12 @@ class McapWriter:
 
     Attributes
     ----------
-    counts : messages by channel id, those in chunks on disk.
-    first, last : log times of these, ns; 0 if there are none.
+    counts : of the messages in chunks on disk.
     position : bytes on disk.
     """
 
     def __init__(self, stream: FileIO, library: str, chunk_size: int, level: int = FAST) -> None:
-        self.counts: dict[int, int] = {}
-        self.first, self.last = 0, 0
+        self.counts = MessageCounts()
         self.position = 0
         self._stream = stream
         self._chunk_size = chunk_size
@@ -110,10 +109,8 @@ class McapWriter:
             chunk.uncompressed_size,
         )  # fmt: skip
         self._summarize(Opcode.CHUNK_INDEX, found)
-        self.first = min(self.first, first) if self.counts else first
-        self.last = max(self.last, last)
-        for channel, entries in index.items():
-            self.counts[channel] = self.counts.get(channel, 0) + len(entries) // 2
+        numbers = Counter({channel: len(entries) // 2 for channel, entries in index.items()})
+        self.counts = together([self.counts, MessageCounts(first, last, numbers)])
 
     def attach(self, attachment: records.Attachment) -> None:
         """Write an attachment, behind the messages before it."""
@@ -156,11 +153,11 @@ class McapWriter:
         return records.Statistics(
             attachment_count=self._numbers[Opcode.ATTACHMENT_INDEX],
             channel_count=self._numbers[Opcode.CHANNEL],
-            channel_message_counts=dict(sorted(self.counts.items())),
+            channel_message_counts=dict(sorted(self.counts.by_channel.items())),
             chunk_count=self._numbers[Opcode.CHUNK_INDEX],
-            message_count=sum(self.counts.values()),
-            message_end_time=self.last,
-            message_start_time=self.first,
+            message_count=self.counts.by_channel.total(),
+            message_end_time=self.counts.last,
+            message_start_time=self.counts.first,
             metadata_count=self._numbers[Opcode.METADATA_INDEX],
             schema_count=self._numbers[Opcode.SCHEMA],
         )

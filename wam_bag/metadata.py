@@ -2,14 +2,15 @@
 
 import contextlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import yaml
 from mcap.records import Channel, Schema
 
 from wam_bag import safe_yaml
+from wam_bag.mcap_records import MessageCounts, together
 
 LIBRARY: Final = "wam_stack"  # that writes the files
 INFINITE: Final = {"sec": 9223372036, "nsec": 854775807}
@@ -24,50 +25,39 @@ def offered(depth: int = 1000, is_latched: bool = False) -> dict[str, Any]:
     }  # fmt: skip
 
 
-class FileSummary(NamedTuple):
-    """One file in metadata.yaml: name, first and last log time in ns, messages."""
-
-    name: str
-    first: int
-    last: int
-    messages: int
-
-
 def bag_information(
-    files: Sequence[FileSummary], topics: Sequence[Mapping[str, Any]], counts: Sequence[int]
+    files: Mapping[str, MessageCounts], topics: Sequence[Mapping[str, Any]], counts: Sequence[int]
 ) -> dict[str, Any]:
     """Content of metadata.yaml (version 9 of rosbag2).
 
     Parameters
     ----------
-    files : files of the bag in their order.
+    files : of the bag in their order, by name.
     topics : name, type, serialization_format, offered_qos_profiles and type_description_hash of each.
     counts : messages of each topic.
     """
-    filled = [file for file in files if file.messages]
-    first = min((file.first for file in filled), default=0)
-    last = max((file.last for file in filled), default=0)
     return {
         "version": 9,
         "storage_identifier": "mcap",
-        **_extent(first, last, sum(file.messages for file in files)),
+        **_extent(files.values()),
         "topics_with_message_count": [
             {"topic_metadata": topic, "message_count": count} for topic, count in zip(topics, counts, strict=True)
         ],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file.name for file in files],
-        "files": [{"path": file.name, **_extent(file.first, file.last, file.messages)} for file in files],
+        "relative_file_paths": [*files],
+        "files": [{"path": name, **_extent([found])} for name, found in files.items()],
         "custom_data": None,
         "ros_distro": os.environ.get("ROS_DISTRO", "jazzy"),
     }
 
 
-def _extent(first: int, last: int, count: int) -> dict[str, Any]:
+def _extent(parts: Iterable[MessageCounts]) -> dict[str, Any]:
+    first, last, numbers = together(parts)
     return {
-        "duration": {"nanoseconds": last - first if count else 0},
-        "starting_time": {"nanoseconds_since_epoch": first if count else 0},
-        "message_count": count,
+        "duration": {"nanoseconds": last - first},
+        "starting_time": {"nanoseconds_since_epoch": first},
+        "message_count": numbers.total(),
     }
 
 

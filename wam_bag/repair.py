@@ -14,10 +14,10 @@ from wam_bag.bag_file import files
 from wam_bag.bag_writer import CHUNK_SIZE, release
 from wam_bag.errors import BROKEN, BagError, Damage, TooLargeError
 from wam_bag.losses import REPAIRED, FileLosses, Hole
-from wam_bag.mcap_file import McapFile, MessageCounts
-from wam_bag.mcap_records import RecordExtent, parsed
+from wam_bag.mcap_file import McapFile
+from wam_bag.mcap_records import MessageCounts, RecordExtent, parsed
 from wam_bag.mcap_writer import McapWriter
-from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
+from wam_bag.metadata import LIBRARY, bag_information, topic_information, write_metadata
 
 UNFINISHED: Final = ".repaired"  # suffix of a file while it is written
 
@@ -86,7 +86,7 @@ def _repair_file(path: Path) -> Repaired:
             raise BagError(f"{path} cannot be repaired: {error}; nothing was changed") from None
         finally:
             new.unlink(missing_ok=True)
-    return Repaired(path.name, sum(counts.by_channel.values()), counts.first, losses)
+    return Repaired(path.name, counts.by_channel.total(), counts.first, losses)
 
 
 def _count(path: Path) -> MessageCounts:
@@ -96,7 +96,7 @@ def _count(path: Path) -> MessageCounts:
         file.check_all()
         for _ in file.batches():
             pass
-        if file.counts is None or +Counter(file.counts.by_channel) != Counter(file.loaded.by_channel):
+        if file.counts is None or +file.counts.by_channel != file.loaded.by_channel:
             raise Damage("its statistics do not match its messages")
         return file.loaded
 
@@ -153,7 +153,7 @@ class _Copy:
         """The losses; by topic if the file has its own count of its messages."""
         file, holes, messages = self._file, self._holes, Counter[str]()
         if holes and file.counts is not None:
-            lost = Counter(file.counts.by_channel) - Counter(self._writer.counts)
+            lost = file.counts.by_channel - self._writer.counts.by_channel
             holes = holes if lost else []  # only indexes could not be read
             for number, count in lost.items():
                 channel = file.channels.get(number)
@@ -203,13 +203,12 @@ def _is_listed(path: Path, names: list[str]) -> bool:
 
 
 def _information(files: list[Path]) -> dict[str, Any]:
-    summaries, topics, counts = [], dict[str, dict[str, Any]](), Counter[str]()
+    found, topics, counts = dict[str, MessageCounts](), dict[str, dict[str, Any]](), Counter[str]()
     for path in files:
         with McapFile(path) as file:
             file.open()
-            found = file.counts or MessageCounts(0, 0, {})
-            summaries.append(FileSummary(path.name, found.first, found.last, sum(found.by_channel.values())))
+            one = found[path.name] = file.counts or MessageCounts()
             for number, channel in file.channels.items():
-                counts[channel.topic] += found.by_channel.get(number, 0)
+                counts[channel.topic] += one.by_channel[number]
                 topics.setdefault(channel.topic, topic_information(channel, file.schemas[channel.schema_id]))
-    return bag_information(summaries, list(topics.values()), [counts[topic] for topic in topics])
+    return bag_information(found, list(topics.values()), [counts[topic] for topic in topics])

@@ -1,6 +1,7 @@
 """Bags of ROS 1, of SQLite and those compressed by rosbag2, opened for reading by rosbags: without checksums."""
 
 import importlib
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -8,7 +9,8 @@ from mcap.records import Channel, Schema
 
 from wam_bag.cdr import CDR, ROS1, SCHEMAS
 from wam_bag.errors import BagError
-from wam_bag.mcap_file import BATCH, BagFile, MessageCounts
+from wam_bag.mcap_file import BATCH, BagFile
+from wam_bag.mcap_records import MessageCounts
 from wam_bag.message_search import NEVER, MessageBatch, packed
 
 SUFFIXES: Final = (".bag", ".db3")
@@ -34,7 +36,7 @@ class RosbagsFile(BagFile):
             text = reader.typestore.generate_msgdef(one.msgtype, ros_version=1 + reader.is2)[0] if is_known else ""
             self.schemas[one.id] = Schema(one.id, text.encode(), SCHEMAS[encoding] if is_known else "", one.msgtype)
             self.channels[one.id] = Channel(one.id, one.topic, encoding, {}, one.id)
-        counts = {one.id: one.msgcount for one in reader.connections}
+        counts = Counter({one.id: one.msgcount for one in reader.connections})
         first, last = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
         self.counts = MessageCounts(first, last, counts)
 
@@ -42,7 +44,7 @@ class RosbagsFile(BagFile):
         self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
     ) -> Iterator[MessageBatch]:
         """Messages as `BagFile.batches`, of all times."""
-        self.loaded = MessageCounts(0, 0, {})
+        self.loaded = MessageCounts()
         reader, size = self._reader, 0
         found: list[tuple[int, int, bytes]] = []
         wanted = [one for one in reader.connections if channels is None or one.id in channels]
