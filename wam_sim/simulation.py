@@ -64,20 +64,17 @@ class Simulation:
         configuration = configuration.with_values({"nodes": [*entries, SCENARIO], "timing.mode": "lockstep"})
         self.configuration = configuration
         shared = configuration.shared
-        self._timing = shared.timing
         self._patience = round(shared.timing.timeout * 1e9)  # ns, for which the scenario may get nothing
         self._looked = 0  # ns, when the scenario was last seen to go on
         self.driver = Driver(shared, configuration.node("driver", DriverParameters))
         self.driver.stale_advice = self._cause
         own = dict(controllers or {})
         self._interface = Interface(shared, own)
-        self._settings = {name: dict(flat) for name, flat in configuration.sections.items()}
+        self._settings = dict(configuration.sections)
         self._bus = NodeBus(self._interface, self._interface.topics)
         self._bus.listen("motor_current_command", self._command)
         self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
         self._publishers = {topic: self._bus.publisher(topic) for topic in self._interface.topics}
-        self._publish_states = self._publishers["motor_states"]
-        self._publish_status = self._bus.publisher(of_node("driver", STATUS))
         self._currents: tuple[int, list[float]] = (0, [])
         self._reported: tuple[Mode, tuple[Event, ...]] | None = None
         self._warned: dict[str, set[tuple[Any, ...]]] = {}  # of each node, what its last status was about
@@ -95,7 +92,6 @@ class Simulation:
             elif name != "driver":
                 self._connect(declaration)
         self._motors = len(shared.arm.motors.names)
-        self._publish_sensors = self._publishers.get("joint_sensors")
         if FORCE_LOOP in self.nodes:
             self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
@@ -186,10 +182,10 @@ class Simulation:
         if driver.is_outer:
             for topic, value in driver.outer_values().items():
                 self._publishers[topic](stamp, value)
-        if self._publish_sensors is not None:
-            self._publish_sensors(stamp, driver.joint_sensors)
-        self._publish_states(stamp, driver.motor_state)
-        if self.nodes[SCENARIO].done:
+        if "joint_sensors" in self._publishers:
+            self._publishers["joint_sensors"](stamp, driver.joint_sensors)
+        self._publishers["motor_states"](stamp, driver.motor_state)
+        if self.scenario.done:
             self._report(stamp)  # what it requested at its end
             return True
         if stamp - self._looked >= self._patience:
@@ -227,7 +223,7 @@ class Simulation:
             safety = self.driver.safety
             answer = safety.enable(self.driver.obstacle) if request.data else safety.disable()
             for synchroniser in set().union(*self._synchronisers.values()):
-                synchroniser.discard_commands(self.driver.stamp + self._timing.period_ns)
+                synchroniser.discard_commands(self.driver.stamp + self.driver.timing.period_ns)
         else:
             answer = getattr(node, request.service)()
         return "" if answer.success else answer.message
@@ -264,4 +260,4 @@ class Simulation:
         for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):
                 self._bus.publish_of(node_name, stamp, node.take_status(status) or {})
-        self._publish_status(stamp, status)
+        self._bus.publisher(of_node("driver", STATUS))(stamp, status)
