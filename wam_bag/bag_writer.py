@@ -79,8 +79,7 @@ class BagWriter:
         self._largest = split.size or math.inf  # bytes of a file
         self._longest = round(split.seconds * 1e9) or math.inf  # ns in a file
         self._files: dict[str, MessageCounts] = {}  # that are finished
-        self._topics: dict[str, tuple[Channel, Schema]] = {}
-        self._lengths: dict[str, ExactLength] = {}
+        self._topics: dict[str, tuple[Channel, Schema, ExactLength]] = {}
         self._schemas: dict[str, Schema] = {}
         self._next_flush = 0.0
         self._file_begin: int | None = None
@@ -114,8 +113,8 @@ class BagWriter:
         """
         definition = self._schemas.setdefault(kind, Schema(len(self._schemas) + 1, schema(kind), "ros2msg", kind))
         metadata = {"offered_qos_profiles": safe_yaml.dump([qos]).strip(), "topic_type_hash": type_hash(kind)}
-        self._topics[name] = Channel(len(self._topics) + 1, name, "cdr", metadata, definition.id), definition
-        self._lengths[name] = ExactLength(kind)
+        channel = Channel(len(self._topics) + 1, name, "cdr", metadata, definition.id)
+        self._topics[name] = channel, definition, ExactLength(kind)
         self._define(name)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
@@ -133,10 +132,8 @@ class BagWriter:
         RecordingError
             if it cannot be written to disk; the bag is closed then and can be read.
         """
-        channel, _ = self._topics[topic]
-        length = self._lengths[topic](data)
-        if length < len(data):
-            data = data[:length]
+        channel, _, length_of = self._topics[topic]
+        data = data[: length_of(data)]
         if self._file_begin is None:
             self._file_begin = log_time
         try:  # not the context manager, which would take as long as all the rest
@@ -229,7 +226,7 @@ class BagWriter:
 
     def _define(self, topic: str) -> None:
         """Define a topic in the present file."""
-        channel, definition = self._topics[topic]
+        channel, definition, _ = self._topics[topic]
         self._writer.define(definition)
         self._writer.define(channel)
 
@@ -274,8 +271,9 @@ class BagWriter:
         write_metadata(self.path, self._information(self._files))
 
     def _information(self, files: Mapping[str, MessageCounts]) -> dict[str, Any]:
-        topics, counts = [topic_information(*records) for records in self._topics.values()], together(files.values())
-        return bag_information(files, topics, [counts.by_channel[channel.id] for channel, _ in self._topics.values()])
+        records, counts = self._topics.values(), together(files.values()).by_channel
+        topics = [topic_information(channel, definition) for channel, definition, _ in records]
+        return bag_information(files, topics, [counts[channel.id] for channel, *_ in records])
 
 
 def _reserve(path: Path) -> BinaryIO:
