@@ -178,10 +178,6 @@ class RecordedRun(NamedTuple):
         columns = self.columns(topic)
         return columns if isinstance(columns, kind) and len(columns.stamp_ns) else None
 
-    def messages(self, topic: str) -> Sequence[Any]:
-        """Decoded messages of a topic that is no column, none if it was not recorded."""
-        return messages_of(self.bag, f"{self.namespace}/{topic}")
-
 
 def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
     """The run in a bag, which may lack anything.
