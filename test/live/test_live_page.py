@@ -33,7 +33,7 @@ from ros_network import Network
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
 from wam_cli.commands.live import page_next_to
-from wam_cli.options import take_page
+from wam_cli.options import take_page, take_stack
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.event import Code, Level, holding
@@ -551,6 +551,7 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
 def options(*given: str) -> Any:
     parser = argparse.ArgumentParser()
     take_page(parser, default=None)
+    take_stack(parser)
     return parser.parse_args(given)
 
 
@@ -559,12 +560,12 @@ def test_a_page_that_was_asked_for_is_refused_where_there_can_be_none(capsys: py
         port = str(taken.getsockname()[1])
         with (
             pytest.raises(NoPageError, match=f"port {port} .* --port"),
-            page_next_to(options("--live", "--port", port), "wam"),
+            page_next_to(options("--live", "--port", port), bool),
         ):
             pass
-        with page_next_to(options("--port", port), "wam"):
+        with page_next_to(options("--port", port), bool):
             assert f"no live page: port {port}" in capsys.readouterr().out
-        with page_next_to(options("--no-live", "--port", port), "wam"):
+        with page_next_to(options("--no-live", "--port", port), bool):
             assert capsys.readouterr().out == ""
 
 
@@ -572,7 +573,7 @@ def test_a_page_that_is_late_is_reported_once_and_ends_with_its_stack(
     domain_id: int, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("wam_cli.commands.live.LATE", 0.0)  # no page is there at once
-    with page_next_to(options("--port", str(port := free_port())), "wam"):
+    with page_next_to(options("--port", str(port := free_port())), bool):
         until(lambda: not port_is_free(port))
     assert capfd.readouterr().out.count("still starting") == 1
     assert port_is_free(port)
@@ -580,7 +581,7 @@ def test_a_page_that_is_late_is_reported_once_and_ends_with_its_stack(
 
 def test_a_page_that_loses_its_port_is_reported_at_the_end(domain_id: int, capfd: pytest.CaptureFixture[str]) -> None:
     port = free_port()
-    with page_next_to(options("--port", str(port)), "wam", lambda: True), socket.create_server((HOST, port)):
+    with page_next_to(options("--port", str(port)), lambda: True), socket.create_server((HOST, port)):
         until(lambda: os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT))
     said = capfd.readouterr()
     assert f"port {port} of {HOST} is taken" in said.err

@@ -94,17 +94,14 @@ def _recording(given: argparse.Namespace) -> int:
 
 
 @contextmanager
-def page_next_to(
-    given: argparse.Namespace, namespace: str, is_stopped: Callable[[], bool] = lambda: False
-) -> Iterator[Callable[[], None]]:
+def page_next_to(given: argparse.Namespace, is_stopped: Callable[[], bool]) -> Iterator[Callable[[], None]]:
     """The page of a stack that is about to start, as its options set it; yields what ends it.
 
     It waits until the page can be opened.  End the page before the stack, which at its end waits for its listeners.
 
     Parameters
     ----------
-    given : options of `take_page`.
-    namespace : of the stack.
+    given : options of `take_page`, and the namespace of the stack.
     is_stopped : whether to wait no longer.
 
     Raises
@@ -114,11 +111,11 @@ def page_next_to(
     """
     with ExitStack() as ending:
         if given.live is not False:
-            _start_page(given, namespace, is_stopped, ending)
+            _start_page(given, is_stopped, ending)
         yield ending.close
 
 
-def _start_page(given: argparse.Namespace, namespace: str, is_stopped: Callable[[], bool], ending: ExitStack) -> None:
+def _start_page(given: argparse.Namespace, is_stopped: Callable[[], bool], ending: ExitStack) -> None:
     port = free_port(given.port, _print)
     if reason := obstacle(port):
         if given.live:
@@ -128,7 +125,7 @@ def _start_page(given: argparse.Namespace, namespace: str, is_stopped: Callable[
     from wam_ros.bring_up import CommandProcess
 
     # a process of its own can neither delay nor fail the stack
-    page = CommandProcess(["live", "--port", str(port), "--namespace", namespace], stdin=subprocess.DEVNULL)
+    page = CommandProcess(["live", "--port", str(port), "--namespace", given.namespace], stdin=subprocess.DEVNULL)
     ending.callback(_end, page)
     late = time.monotonic() + LATE
     while page.poll() is None and port_is_free(port) and not is_stopped():

@@ -98,7 +98,7 @@ def run_nodes(configuration: Configuration, given: argparse.Namespace, stop: Sto
     started : printed before the names of the processes; '' for nothing.
     """
     processes = processes_of(configuration, given)
-    with page_next_to(given, given.namespace, lambda: stop.is_set) as close_page:
+    with page_next_to(given, lambda: stop.is_set) as close_page:
         if processes == ONE:
             require_start(configuration, given.namespace)
             if started:
