@@ -239,11 +239,11 @@ def take_time(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def timed(configuration: Configuration, given: argparse.Namespace) -> Configuration:
-    """The configuration with what the options set for time."""
+def timed(given: argparse.Namespace) -> Configuration:
+    """`configuration_of`, with what the options set for time."""
     mode = "realtime" if given.realtime else None
     values = {"timing.mode": mode, "timing.real_time_factor": given.real_time_factor}
-    timed = configuration.with_values({name: value for name, value in values.items() if value is not None})
+    timed = configuration_of(given).with_values({name: value for name, value in values.items() if value is not None})
     if given.real_time_factor is not None and timed.shared.timing.mode == "realtime":
         raise ValueError("--real-time-factor is for lockstep; leave out --realtime")
     return timed

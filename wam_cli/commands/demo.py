@@ -12,7 +12,6 @@ from wam_bag.bag_name import dated
 from wam_bag.errors import BagError
 from wam_cli.options import (
     ARM,
-    configuration_of,
     exit_code_of,
     filled,
     processes_of,
@@ -73,7 +72,7 @@ def _task(name: str) -> str:
 def run(given: argparse.Namespace) -> int:
     """Play and record a demonstration, then print its report."""
     task = load(given.task) if given.task else None
-    base = timed(configuration_of(given), given)
+    base = timed(given)
     if given.scenario:
         base = base.with_values({"scenario:script": given.scenario})
     name = given.name or dated(task.name if task else "demo")

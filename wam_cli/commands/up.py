@@ -10,7 +10,6 @@ from typing import NamedTuple
 from wam_bag.bag_name import dated
 from wam_cli.commands.live import page_next_to
 from wam_cli.options import (
-    configuration_of,
     filled,
     processes_of,
     take_configuration,
@@ -48,7 +47,7 @@ def run(given: argparse.Namespace) -> int:
     """Start the nodes and wait for the first to end."""
     die_with_parent()
     end_at_once_on_signals()  # there is nothing to clean up yet
-    configuration = timed(configuration_of(given), given)
+    configuration = timed(given)
     extra = ["scenario"] * bool(given.scenario) + ["recorder"] * given.record
     configuration = configuration.with_nodes(*extra)
     if given.record:
