@@ -15,8 +15,8 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wam_bag.bag import BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
-from wam_description.arm import Shared
+from wam_bag.bag import BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_description.arm import Arm, Shared
 from wam_description.configuration import Configuration
 from wam_description.defects import owners
 from wam_description.interface import Interface, declared
@@ -144,10 +144,7 @@ def replay(
     period, recorded = shared.timing.period, was.shared.timing.period if was.nodes else shared.timing.period
     require(period == recorded, f"timing.period is {period:g} s; in a replay it must be {recorded:g} s, as recorded")
     published = _run(run, shared, declaration, own)
-    compared = []
-    for topic in map(rows.__getitem__, outputs):
-        columns, names = run.columns(topic.name), owners(topic, shared.arm)
-        compared.append(_compare(topic, columns, published.get(topic.name, []), names))
+    compared = [_compare(run, rows[topic], shared.arm, published.get(topic, [])) for topic in outputs]
     if not any(one.compared or one.only_recorded or one.only_replayed for one in compared):
         raise BagError(
             f"{path}: {declaration.name} publishes nothing from these inputs, and the bag has no message of it: "
@@ -227,22 +224,13 @@ def _run(run: RecordedRun, shared: Shared, declaration: Declaration, own: Any) -
     bus = NodeBus(interface, declaration.outputs)
     bus.connect(declaration, node, changing)
     taken = [topic for topic in declaration.inputs if topic in interface.topics and topic not in declaration.outputs]
-    recorded = [interface.topics[topic] for topic in taken]
-    publishers = {topic.name: bus.publisher(topic.name) for topic in recorded}
-    for _, topic, stamp, value in _messages(run, recorded, shared):
-        publishers[topic](stamp, value)
+    messages: list[tuple[Any, ...]] = []
+    for name in taken:
+        publish, found = bus.publisher(name), _values(run, interface.topics[name], shared.arm)
+        messages += [(logged, publish, stamp, value) for logged, stamp, value in found]
+    for _, publish, stamp, value in sorted(messages, key=itemgetter(0)):  # in the order in which they came
+        publish(stamp, value)
     return bus.rows
-
-
-def _messages(run: RecordedRun, inputs: Sequence[Topic], shared: Shared) -> list[tuple[int, str, int, Any]]:
-    """Log time, topic, stamp and value of every input in the order in which they came."""
-    found: list[tuple[int, str, int, Any]] = []
-    for topic in inputs:
-        if (columns := run.columns(topic.name)) is not None:
-            times = columns.log_time_ns.tolist()
-            values = _values(columns, owners(topic, shared.arm))
-            found += [(time, topic.name, *value) for time, value in zip(times, values, strict=True)]
-    return sorted(found, key=itemgetter(0))
 
 
 def _trajectory(message: Any, names: Sequence[str]) -> PosturePath:
@@ -261,13 +249,17 @@ def _trajectory(message: Any, names: Sequence[str]) -> PosturePath:
     return PosturePath(tuple(points))
 
 
-def _values(columns: Columns, names: Sequence[str]) -> list[tuple[int, Any]]:
-    """Stamp and value of each recorded message."""
-    if isinstance(columns, Messages):
-        stamps = [message.header.stamp for message in columns.messages]
-        paths = [_trajectory(message, names) for message in columns.messages]
-        return [(stamp.sec * 1_000_000_000 + stamp.nanosec, path) for stamp, path in zip(stamps, paths, strict=True)]
+def _values(run: RecordedRun, topic: Topic, arm: Arm) -> list[tuple[int, int, Any]]:
+    """Log time, stamp and value of each recorded message of a topic, none where it was not recorded."""
+    columns, names = run.columns(topic.name), owners(topic, arm)
     found: Iterable[Any]
+    if columns is None:
+        return []
+    logged = columns.log_time_ns.tolist()
+    if isinstance(columns, Messages):
+        times = [message.header.stamp for message in columns.messages]
+        stamps = [time.sec * 1_000_000_000 + time.nanosec for time in times]
+        return list(zip(logged, stamps, [_trajectory(message, names) for message in columns.messages], strict=True))
     if isinstance(columns, JointColumns):
         found = map(State, *(_array(columns, field, names) for field in State._fields))
     elif isinstance(columns, WrenchColumns):
@@ -277,7 +269,7 @@ def _values(columns: Columns, names: Sequence[str]) -> list[tuple[int, Any]]:
     else:
         assert isinstance(columns, PointColumns)
         found = map(Point, columns.frames, map(tuple, columns.point.tolist()))
-    return list(zip(columns.stamp_ns.tolist(), found, strict=True))
+    return list(zip(logged, columns.stamp_ns.tolist(), found, strict=True))
 
 
 def tables(columns: TableColumns) -> list[Table]:
@@ -300,21 +292,22 @@ def _array(columns: JointColumns, field: str, names: Sequence[str]) -> list[list
     return [[] if math.isnan(row[0]) else row for row in ordered.tolist()]
 
 
-def _labels(topic: Topic, columns: Columns, names: Sequence[str]) -> list[tuple[str, str]]:
-    """Field and unit of each number of a message, of a table for one row."""
+def _labels(run: RecordedRun, topic: Topic, arm: Arm) -> list[tuple[str, str]]:
+    """Field and unit of each number of a recorded message, of a table for one row."""
+    columns = run.columns(topic.name)
     if topic.type == TABLE:
         return [(column, "") for column in topic.columns]
     if not isinstance(columns, JointColumns):
         return [(f"{field}{axis}", unit) for field, unit in _FIELDS[topic.type] for axis in "xyz"]
     units = zip(State._fields, ("rad", "rad/s", "A" if "current" in topic.name else "N m"), strict=True)
-    return [(name, unit) for field, unit in units if getattr(columns, field).shape[1] for name in names]
+    return [(name, unit) for field, unit in units if getattr(columns, field).shape[1] for name in owners(topic, arm)]
 
 
-def _compare(topic: Topic, columns: Columns | None, replayed: Sequence[TopicValue], names: Sequence[str]) -> Compared:
-    recorded = [flat(topic, *message) for message in _values(columns, names)] if columns else []
+def _compare(run: RecordedRun, topic: Topic, arm: Arm, replayed: Sequence[TopicValue]) -> Compared:
+    recorded = [flat(topic, stamp, value) for _, stamp, value in _values(run, topic, arm)]
     known = {row.stamp: row for row in replayed}
     both = [(row, known[row.stamp]) for row in recorded if row.stamp in known]
-    labels = _labels(topic, columns, names) if columns else []
+    labels = _labels(run, topic, arm) if recorded else []
     differing = [one for old, new in both if (one := _differences(topic, old, new, labels))]
     first = differing[0][0][0] if differing else None
     sizes = [(size, unit) for _, size, unit in chain(*differing) if 0.0 < size < math.inf]
