@@ -209,7 +209,7 @@ def _changes(run: RecordedRun, node: str, own: Any) -> list[tuple[int, Any]]:
 def _run(run: RecordedRun, shared: Shared, declaration: Declaration, own: Any) -> Rows:
     changes = _changes(run, declaration.name, own)
     interface, node = Interface(shared, started_by_hand=declaration), declaration.make(shared, own)
-    for item in (item for reaction in declaration.reactions for item in reaction.inputs):
+    for item in declaration.taken:
         if item.age == "command" and run.columns(item.topic) is None:
             interface.topics.pop(item.topic, None)  # the scenario that was recorded did not have this command
 
