@@ -130,7 +130,9 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
         if not isinstance(tree, dict):
             raise ValueError("it has no sections")
         recorded = {
-            str(name).removeprefix(f"{namespace}/"): _own(dict(dotted(body[PARAMETERS])))
+            str(name).removeprefix(f"{namespace}/"): {
+                key: value for key, value in dotted(body[PARAMETERS]) if not key.startswith(OF_ROS)
+            }
             for name, body in tree.items()
             if str(name).rpartition("/")[0] == namespace
         }
@@ -145,11 +147,6 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
     note = " and ".join(text for text in lists if text)
     notes = (f"the recording {note}: it is of another version, record it again",) if note else ()
     return RecordedParameters(str(bag.path), recorded, hashlib.sha256(attached).hexdigest(), problem, notes)
-
-
-def _own(values: Values) -> dict[str, Any]:
-    """Parameters of the stack, without those that every ROS node has."""
-    return {name: value for name, value in values.items() if not name.startswith(OF_ROS)}
 
 
 def _refusal(cls: type, values: Values) -> str:
