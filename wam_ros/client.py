@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from functools import cache, partial
 from pkgutil import resolve_name
 from typing import Any, Final
@@ -350,23 +350,3 @@ class StackClient(Closing):
                 raise NoAnswerError(f"{failure} within {limit:g} s; {self.advice}")
             check()
             self.spin_once(0.05)
-
-
-def run_next_to(
-    namespace: str, name: str, make: Callable[[StackClient], AbstractContextManager[Any]], until: Callable[[], bool]
-) -> None:
-    """Run a program until a condition holds, next to a stack, which may start later.
-
-    Parameters
-    ----------
-    namespace : of the stack.
-    name : of the program's node.
-    make : makes what works, from a client that has the driver's shared parameters.
-    until : the condition.
-    """
-    with StackClient(namespace, name) as client:
-        if found := client.await_driver(until):
-            client.shared = build_part(Shared, found["driver"])
-            with make(client):
-                while not until():
-                    client.spin_once(0.1)

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from wam_cli.options import ARM, namespace, take_port
+from wam_description.arm import Shared
+from wam_description.parameters import build_part
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle, port_is_free, url
 from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
@@ -69,12 +71,15 @@ def _page(given: argparse.Namespace) -> None:
 
 def _trajectories(given: argparse.Namespace) -> None:
     from wam_live.trajectory_action import TrajectoryServer
-    from wam_ros.client import run_next_to
+    from wam_ros.client import StackClient
 
     stop = Stop()
-    run_next_to(
-        given.namespace, "trajectory_action", lambda client: TrajectoryServer(client, _print), lambda: stop.is_set
-    )
+    with StackClient(given.namespace, "trajectory_action") as client:
+        if found := client.await_driver(lambda: stop.is_set):
+            client.shared = build_part(Shared, found["driver"])
+            with TrajectoryServer(client, _print):
+                while not stop.is_set:
+                    client.spin_once(0.1)
 
 
 def _recording(given: argparse.Namespace) -> int:
