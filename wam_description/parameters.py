@@ -353,7 +353,7 @@ def lengths(group: str, names: Sequence[Any], arrays: Mapping[str, Sequence[Any]
     names : what the arrays run over.
     arrays : arrays by the name of their field.
     """
-    _require_lengths(_wrong_length(group, name, array, width * len(names)) for name, array in arrays.items())
+    _require_lengths(group, ((name, array, width * len(names), False) for name, array in arrays.items()))
 
 
 def aligned(group: str, names: Sequence[Any], given: Any) -> None:
@@ -365,22 +365,18 @@ def aligned(group: str, names: Sequence[Any], given: Any) -> None:
     names : what all of its lists run over.
     given : the object.
     """
-    _require_lengths(
-        _wrong_length(group, name, array, declared["width"] * len(names), declared["is_common"])
-        for name, array, declared in _lists(given)
-    )
+    lists = ((name, array, one["width"] * len(names), one["is_common"]) for name, array, one in _lists(given))
+    _require_lengths(group, lists)
 
 
-def _wrong_length(group: str, name: str, array: Sequence[Any], needed: int, is_common: bool = False) -> str:
-    """What is wrong with the length of a list, '' where nothing; one value is enough where that `is_common`."""
-    if len(array) == needed or (is_common and len(array) == 1):
-        return ""
-    return f"parameter '{group}.{name}' has {len(array)} values; it needs {'1 or ' * is_common}{needed}"
-
-
-def _require_lengths(wrong: Iterable[str]) -> None:
-    found = list(filter(None, wrong))
-    require(not found, "; ".join(found))
+def _require_lengths(group: str, lists: Iterable[tuple[str, Sequence[Any], int, bool]]) -> None:
+    """Refuse lists, each with its name, of another length than needed; one value is enough where that is common."""
+    wrong = [
+        f"parameter '{group}.{name}' has {len(array)} values; it needs {'1 or ' * is_common}{needed}"
+        for name, array, needed, is_common in lists
+        if len(array) not in (needed, 1 if is_common else needed)
+    ]
+    require(not wrong, "; ".join(wrong))
 
 
 def each(array: tuple[T, ...], count: int) -> tuple[T, ...]:
