@@ -102,10 +102,7 @@ def parameter(
         anywhere in its class.
     follows : name of the parameter whose value it has where a configuration gives none; `like` sets it.
     """
-    metadata = {
-        "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live, "width": width,
-        "is_common": is_common, "length": length, "default": default, "follows": follows,
-    }  # fmt: skip
+    metadata = locals()  # the arguments
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, kw_only=True, metadata=metadata)
