@@ -24,7 +24,6 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import mjcf
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_sim.simulation import Simulation
@@ -91,7 +90,7 @@ class Case:
         self.bare = mujoco.MjModel.from_xml_string(mjcf(arm, step, parameters.world, parameters.effects))
         self.data = mujoco.MjData(self.bare)
         gravity = RigidBody(arm).gravity_torque(q).tolist()
-        self.torque = [tau + extra for tau in TransmissionMap.of(arm).motor_torques(gravity)]
+        self.torque = [tau + extra for tau in arm.transmission.motor_torques(gravity)]
         self.plant.brake(False)
         if pushed:
             self.plant.push(arm.covers.names[-1], *PUSH)

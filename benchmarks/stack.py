@@ -36,7 +36,6 @@ from wam_description.nodes import EACH, GROUPED
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.topics import BY_NAME
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.messages import joint_state
@@ -76,7 +75,7 @@ def bare(configuration: Configuration, length: float) -> float:
     arm, step = shared.arm, shared.timing.substep
     model = mujoco.MjModel.from_xml_string(mjcf(arm, step, driver.world, driver.effects))
     data = mujoco.MjData(model)
-    n, transmission = len(arm.joints.names), TransmissionMap.of(arm)
+    n, transmission = len(arm.joints.names), arm.transmission
     data.qpos[n : 2 * n] = arm.joints.start
     data.qpos[:n] = transmission.motor_from_joint @ arm.joints.start
     data.ctrl[:] = transmission.motor_torques(RigidBody(arm).gravity_torque(arm.joints.start).tolist())

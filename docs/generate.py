@@ -33,7 +33,6 @@ from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import fields
 from wam_description.topics import FORCE_AXIS, TOPICS
-from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
 from wam_sim.batch import processes
 from wam_sim.pieces import default_file, sources
@@ -300,7 +299,7 @@ def today() -> Arm:
 
 def joints_of_today() -> str:
     """Geometry, range and strength of its joints, as the configuration has them."""
-    joints, through = today().joints, TransmissionMap.of(today())
+    joints, through = today().joints, today().transmission
     degrees = [f"{math.degrees(twist):.0f}" for twist in joints.twist]
     strength = [f"{torque:.3g}" for torque in through.largest_joint_torques(today().motors.peak_torque)]
     ranges = [f"{low:g} to {high:g}" for low, high in zip(joints.lower, joints.upper, strict=True)]
@@ -313,7 +312,7 @@ def motors_of_today() -> str:
     """Its motors; the last two columns are assumed."""
     motors, rows = today().motors, []
     for i, motor in enumerate(motors.names):
-        ratios = zip(today().joints.names, TransmissionMap.of(today()).motor_from_joint[i].tolist(), strict=True)
+        ratios = zip(today().joints.names, today().transmission.motor_from_joint[i].tolist(), strict=True)
         turns = " ".join(f"{ratio:+.7g} {joint}" for joint, ratio in ratios if abs(ratio) > 1e-9)
         known = (motors.inertia, motors.torque_constant, motors.peak_torque, motors.continuous_torque)
         circuit = today().circuits[i]
@@ -394,7 +393,7 @@ def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
 def draw_motor_space() -> None:
     """What the two motors of the differential can give, at the motors and at joints 2 and 3."""
     arm = Configuration.load(CONFIGURATION).shared.arm
-    change = TransmissionMap.of(arm).motor_from_joint[1:3, 1:3].T  # joint torques from motor torques
+    change = arm.transmission.motor_from_joint[1:3, 1:3].T  # joint torques from motor torques
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     peak, friction = (np.array(values[1:3]) for values in (arm.motors.peak_torque, arm.motors.static_friction))
     with picture(ROOT / "docs" / "concepts" / "motor-space.png", 7.2, 3.4) as figure:

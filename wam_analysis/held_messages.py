@@ -13,7 +13,6 @@ from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import BagError, JointColumns
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.arm import Arm, InputAges
-from wam_description.transmission_map import TransmissionMap
 from wam_sim.recorded_commands import COMMANDS
 from wam_sim.recorded_run import RecordedRun
 
@@ -95,7 +94,7 @@ def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, Numbers] | None:
         angles = by_names(columns, "position", names)
         if columns is not None and angles is not None and np.any(good := np.isfinite(angles).all(axis=1)):
             found = angles[good]
-            return columns.stamp_ns[good], found @ TransmissionMap.of(arm).joint_from_motor.T if is_motors else found
+            return columns.stamp_ns[good], found @ arm.transmission.joint_from_motor.T if is_motors else found
     return None
 
 

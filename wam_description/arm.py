@@ -17,6 +17,7 @@ from wam_description.parameters import aligned, lengths, named, parameter, requi
 from wam_description.parts import Joints, Links, Motors
 from wam_description.small_matrices import rotation_xyz
 from wam_description.thresholds import FILES, MODEL
+from wam_description.transmission_map import TransmissionMap
 from wam_description.units import STANDARD_GRAVITY
 
 
@@ -175,8 +176,7 @@ class Arm:
             f"arm.gravity points upwards in the base frame: z is {self.gravity[2]:g} m/s^2; write it negative; "
             "if the arm hangs from a ceiling, turn its base: add pi to arm.joints.twist of the first joint",
         )
-        inverse = np.linalg.inv(np.reshape(self.joint_from_motor, (len(spans), len(spans))))
-        strength = (np.abs(inverse).T @ self.motors.peak_torque).tolist()
+        strength = self.transmission.largest_joint_torques(self.motors.peak_torque)
         for i, joint in enumerate(joints.names):
             torque = STANDARD_GRAVITY * sum(
                 link.mass * (sum(spans[i + 1 : j + 1]) + math.hypot(*link.centre))
@@ -211,7 +211,12 @@ class Arm:
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
         """The cable circuit of each motor, its stages in series."""
-        return circuits(self.motors.names, self.joint_from_motor, self.cables)
+        return circuits(self.motors.names, self.transmission.motor_from_joint, self.cables)
+
+    @property
+    def transmission(self) -> TransmissionMap:
+        """The map between motors and joints."""
+        return TransmissionMap(np.reshape(self.joint_from_motor, (len(self.joints.names), -1)))
 
 
 @dataclass(frozen=True)

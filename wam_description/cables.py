@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_description.parameters import lengths, parameter, require
+from wam_description.small_matrices import Array
 from wam_theory.cable import slack_stretch, stage_compliance, stage_loss
 
 
@@ -55,13 +56,13 @@ class Circuit(NamedTuple):
         return float(slack_stretch(self.stiffness, self.pretension, self.radius))
 
 
-def circuits(motors: Sequence[str], joint_from_motor: Sequence[float], cables: Cables) -> tuple[Circuit, ...]:
+def circuits(motors: Sequence[str], motor_from_joint: Array, cables: Cables) -> tuple[Circuit, ...]:
     """The circuit of each motor.
 
     Parameters
     ----------
     motors : names of the motors.
-    joint_from_motor : the matrix of (A.5), row by row.
+    motor_from_joint : the inverse of the matrix of (A.5).
     cables : the stages of all circuits.
 
     Raises
@@ -71,8 +72,7 @@ def circuits(motors: Sequence[str], joint_from_motor: Sequence[float], cables: C
     """
     for name in cables.stage_motors:
         require(name in motors, f"arm.cables.stage_motors names '{name}'; motors: {', '.join(motors)}")
-    inverse = np.linalg.inv(np.reshape(joint_from_motor, (len(motors), len(motors))))
-    return tuple(_circuit(cables, i, name, float(np.abs(inverse[i]).max())) for i, name in enumerate(motors))
+    return tuple(_circuit(cables, i, name, float(np.abs(motor_from_joint[i]).max())) for i, name in enumerate(motors))
 
 
 def _circuit(cables: Cables, i: int, motor: str, reduction: float) -> Circuit:

@@ -18,7 +18,6 @@ from wam_description.parameters import require, rows
 from wam_description.parts import Motors
 from wam_description.small_matrices import rotation_xyz
 from wam_description.thresholds import MODEL
-from wam_description.transmission_map import TransmissionMap
 from wam_description.world import PUSHER_SHAPES, SHAPES, Folding, Pushers, Springs, World
 from wam_description.xml_element import add, text
 
@@ -207,7 +206,7 @@ def _add_cables(tendons: Element, arm: Arm, effects: Effects) -> None:
 
     With backlash they are the two flanks of a tooth, each with the whole stiffness.
     """
-    motor_from_joint = TransmissionMap.of(arm).motor_from_joint
+    motor_from_joint = arm.transmission.motor_from_joint
     for i, (motor, circuit) in enumerate(zip(arm.motors.names, arm.circuits, strict=True)):
         stretch, share = circuit.slack_stretch if effects.slack else MODEL.never_slack, 0.5
         if play := effects.play(i):

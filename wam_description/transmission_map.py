@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_description.arm import Arm
 from wam_description.small_matrices import Array
 
 
@@ -39,11 +38,6 @@ class TransmissionMap:
         self.motor_from_joint: Array = inverse
         self._forward, self._inverse = _terms(forward), _terms(inverse)
         self._forward_transposed, self._inverse_transposed = _terms(forward.T), _terms(inverse.T)
-
-    @classmethod
-    def of(cls, arm: Arm) -> "TransmissionMap":
-        """The map of an arm, from its `joint_from_motor` row by row."""
-        return cls(np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names))))
 
     def joint_positions(self, theta: Sequence[float]) -> list[float]:
         """Joint angles q = M theta, n, rad, of motor angles theta, n, rad (A.5)."""

@@ -17,7 +17,6 @@ from wam_description.arm import Arm
 from wam_description.parameters import rows
 from wam_description.rigid_body import cover_placement, joint_placement
 from wam_description.signals import ZERO
-from wam_description.transmission_map import TransmissionMap
 from wam_description.xml_element import add, text, written
 
 ROOT = "base_link"
@@ -50,7 +49,7 @@ def urdf(arm: Arm, namespace: str = "") -> str:
         _add_fixed(robot, cover.link, cover.name, cover.origin, cover.rotation)
     add(robot, "link", name=TOOL)
     _add_fixed(robot, arm.links.names[-1], TOOL, arm.tool)
-    efforts = TransmissionMap.of(arm).largest_joint_torques(arm.motors.peak_torque)
+    efforts = arm.transmission.largest_joint_torques(arm.motors.peak_torque)
     for i, (joint, effort) in enumerate(zip(rows(arm.joints), efforts, strict=True)):
         _add_joint(robot, arm, i, joint, effort)
     if namespace:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 from wam_description.arm import Arm
 from wam_description.event import Event, Value, fault
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.thresholds import DRIVER
 
 
@@ -54,7 +53,7 @@ class LimitWatch:
 
     def __init__(self, arm: Arm, cover_speed_limit: float, tip_speed_limit: float) -> None:
         self._arm = arm
-        self._map = TransmissionMap.of(arm)
+        self._map = arm.transmission
         self._body = RigidBody(arm)
         motors, joints = arm.motors, arm.joints
         self._middle = [0.5 * (low + high) for low, high in zip(joints.lower, joints.upper, strict=True)]

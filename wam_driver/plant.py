@@ -26,7 +26,6 @@ from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import each
 from wam_description.signals import Load, ObjectState
-from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
 from wam_driver.dry_friction import DryFriction
@@ -115,7 +114,7 @@ class Plant:
         n = self._n = len(arm.motors.names)
         self._brakes, self._effects = [brake_torque] * n, effects
         self._arm, self._carried = arm, 0.0
-        self._map = TransmissionMap.of(arm)
+        self._map = arm.transmission
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)

@@ -17,7 +17,6 @@ from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.parameters import ParameterError, rows
 from wam_description.rigid_body import Array
-from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.thresholds import PLANT
 
@@ -77,7 +76,7 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     """The arm alone, then with each cover pressed on each surface, at the start and with all joints at 0."""
     n = len(arm.joints.names)
     data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    cables = np.hstack([np.eye(n), -TransmissionMap.of(arm).motor_from_joint, np.zeros((n, model.nv - 2 * n))])
+    cables = np.hstack([np.eye(n), -arm.transmission.motor_from_joint, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
     stiffness += np.diag(model.jnt_stiffness[model.dof_jntid])  # of doors
     damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)

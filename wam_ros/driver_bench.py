@@ -16,7 +16,6 @@ from wam_description.event import Level
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State
 from wam_description.topics import BY_NAME, STATUS
-from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Call
 from wam_ros.client import StackClient
 from wam_ros.health import READY
@@ -84,7 +83,7 @@ class DriverBench(StackClient):
         self.motors, self.least_share = shared.arm.motors, share
         self._current = current
         self.digests = digests(shared)
-        self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
+        self._body, self._map = RigidBody(shared.arm), shared.arm.transmission
         self.carrying = [0.0] * len(self.motors.names)
         self.commanded = list(self.carrying)
         self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in (*KEPT, CLOCK)}

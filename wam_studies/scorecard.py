@@ -10,7 +10,6 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.constants import constants
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_studies.figures.backdrivability import Backdriving
 from wam_studies.plant.ideal_testbed import limiting_efficiency
@@ -56,7 +55,7 @@ def measures(configuration: Configuration) -> Measures:
             "use the configuration 'wam', or one that builds on it"
         )
     driver = configuration.node("driver", DriverParameters)
-    body, tip, gears = RigidBody(arm), Backdriving(arm), TransmissionMap.of(arm).motor_from_joint
+    body, tip, gears = RigidBody(arm), Backdriving(arm), arm.transmission.motor_from_joint
     pose = printed("pose in the middle of the workspace")
     links = body.mass_matrix(pose) + np.diag(arm.joints.armature)
     directions = normal_directions(body, pose)
@@ -101,7 +100,7 @@ def steady_force(arm: Arm) -> float:
 
     The stretched pose of (A.3), which has the longest lever, is added; 0 if gravity alone takes more in one.
     """
-    body, torque_share = RigidBody(arm), TransmissionMap.of(arm).joint_from_motor.T
+    body, torque_share = RigidBody(arm), arm.transmission.joint_from_motor.T
     limits = np.array(arm.motors.continuous_torque)
     ranges = [np.linspace(low, high, POSES) for low, high in zip(arm.joints.lower, arm.joints.upper, strict=True)]
     least = math.inf
@@ -124,7 +123,7 @@ def cycle_force(arm: Arm, levers: Array, stiffness: float) -> float:
     levers : of directions at the tip, (directions, joints), m.
     stiffness : of the contact, N/m.
     """
-    gears, joints = TransmissionMap.of(arm).motor_from_joint, arm.joints
+    gears, joints = arm.transmission.motor_from_joint, arm.joints
     cables = np.square(gears.T) @ [circuit.stiffness for circuit in arm.circuits]
     lever = np.maximum(np.abs(levers), 1e-9)
     torque = stiction_cycle_force(cables, stiffness * lever**2, joints.static_friction, joints.dynamic_friction, 0.0)
@@ -142,7 +141,7 @@ def coupled_bandwidth(arm: Arm, links: Array, levers: Array, stiffness: float) -
     stiffness : of the contact, N/m.
     """
     n = len(arm.motors.names)
-    stretch = np.hstack([np.eye(n), -TransmissionMap.of(arm).motor_from_joint])
+    stretch = np.hstack([np.eye(n), -arm.transmission.motor_from_joint])
     cables = stretch.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ stretch
     inertia = np.block([[np.diag(arm.motors.inertia), np.zeros((n, n))], [np.zeros((n, n)), links]])
     least = math.inf

@@ -30,7 +30,6 @@ from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError, build
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Inputs
 from wam_sim.recorded_run import recorded_run
 from wam_studies.identification.study import IdentificationTrial, run_trial
@@ -72,12 +71,12 @@ class Planted:
         q = np.array(WAM.joints.start) + (sizes * np.sin(turns)).sum(2)
         qd = (sizes * rates * np.cos(turns)).sum(2)
         qdd = -(sizes * rates**2 * np.sin(turns)).sum(2)
-        to_motors = TransmissionMap.of(WAM).motor_from_joint.T
+        to_motors = WAM.transmission.motor_from_joint.T
         self.theta = q @ to_motors
         self.torque = self._torques(q, qd, qdd) + self._coloured(random, noise)
 
     def _torques(self, q: Array, qd: Array, qdd: Array) -> Array:
-        arm, matrix = self.arm, TransmissionMap.of(WAM).joint_from_motor
+        arm, matrix = self.arm, WAM.transmission.joint_from_motor
         body = RigidBody(arm)
         joint = np.array([body.inverse_dynamics(*each) for each in zip(q, qd, qdd, strict=True)])
         joint += qdd * arm.joints.armature + self.joint_coulomb * np.sign(qd)
@@ -244,7 +243,7 @@ def test_a_wrong_model_is_refused_by_name(values: dict[str, Any], text: str) -> 
 
 def pressed(planted: Planted, force: tuple[float, float, float], share: float = 1.0) -> Array:
     """Torques of the motors while a force, N, acts on the outer link in the first part of each 2 s."""
-    body, matrix = RigidBody(WAM), TransmissionMap.of(WAM).joint_from_motor
+    body, matrix = RigidBody(WAM), WAM.transmission.joint_from_motor
     joints = planted.theta @ matrix.T
     pushes = [body.point_jacobian(q, "outer_link", (0.3, 0.0, 0.0)).T @ np.array(force) for q in joints]
     acts = planted.time % 2.0 < 2.0 * share

@@ -19,7 +19,6 @@ from wam_description.parameters import ParameterError
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, State
-from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Inputs
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
@@ -173,7 +172,7 @@ TILTED = (0.0, -1.05, 0.3, 0.9)
 def test_vibration_after_a_contact_is_no_new_one() -> None:
     """At 60 Hz, which passes the faster filter: after a contact it is that of the cables, later a contact."""
     smooth = dataclasses.replace(MOTORS, observer=dataclasses.replace(MOTORS.observer, shape_uncertainty=0.0))
-    transmission, body = TransmissionMap.of(ARM), RigidBody(ARM, MOTORS.observer.mass_scale)
+    transmission, body = ARM.transmission, RigidBody(ARM, MOTORS.observer.mass_scale)
     pose, speed, rest = np.array(TILTED), [1.0, -1.2, 2.0, 1.5], np.zeros(4)
     lever = body.cover_jacobian(pose, "outer_link").T @ (0.0, 0.0, 1.0, 0.0, -0.28, 0.0)
 
@@ -231,7 +230,7 @@ def moving(
     estimators: list[ContactEstimator], move: Move, seconds: float, friction: float, push_at: int = -1
 ) -> list[list[Felt]]:
     """What estimators feel while the arm moves under a plain motor servo."""
-    arm, transmission, body = plant((0.0, -0.9, 0.0, 0.5), friction), TransmissionMap.of(ARM), RigidBody(ARM)
+    arm, transmission, body = plant((0.0, -0.9, 0.0, 0.5), friction), ARM.transmission, RigidBody(ARM)
     arm.brake(False)
     felt: list[list[Felt]] = [[] for _ in estimators]
     for tick, (q, qd) in enumerate(zip(*move.reference(seconds), strict=True)):
@@ -415,7 +414,7 @@ def test_drift_of_friction_is_followed_and_published_once_a_second() -> None:
     assert stamps == list(range(stamps[0], stamps[-1] + 1))
     assert len(stamps) > 12
     friction = np.array([row.values for row in rows]).reshape(len(rows), 8, 6)
-    at_motor = np.abs(TransmissionMap.of(ARM).joint_from_motor[0, 0])
+    at_motor = np.abs(ARM.transmission.joint_from_motor[0, 0])
     total = friction[:, 0, :2] + at_motor * friction[:, 4, :2]  # free motion does not separate motor 1 and joint 1
     assert np.all(friction[:, :4, 3:5] > 0.0)
     assert np.all(friction[5:, :4, 3:5] < 0.25 * friction[5:, :4, :2])  # in motion; before, all that is stated

@@ -18,7 +18,6 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import yielding
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 
 OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 PLAIN = replace(OWN, sensing=replace(OWN.sensing, torque_fraction=0.0))
@@ -143,7 +142,7 @@ def test_what_shakes_the_free_arm_shakes_it_on_a_surface(q: tuple[float, ...], s
     """Links on the cables, and motors on their velocity loops, as one system of both; without dry friction."""
     forces = ForceAxes(RigidBody(replace(WAM, joints=replace(WAM.joints, dynamic_friction=(0.0,) * 4))), PLAIN.sensing)
     shared, dt, frequency = CONFIGURATION.shared, 0.005, 2.0 * math.pi * 25.0
-    at_joints = TransmissionMap.of(WAM).at_joints
+    at_joints = WAM.transmission.at_joints
     cables, servo = at_joints([circuit.stiffness for circuit in WAM.circuits]), shared.servo
     loops = at_joints(servo.integral_gain) + 1j * frequency * at_joints(servo.proportional_gain)
     motors = loops - frequency**2 * at_joints(WAM.motors.inertia)

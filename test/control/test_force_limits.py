@@ -22,11 +22,10 @@ from wam_control.force.limits import (
     servo_yielding,
 )
 from wam_description.signals import ZERO, Contact
-from wam_description.transmission_map import TransmissionMap
 
 JOINTS, STILL, DT = WAM.joints, [0.0] * 4, 0.005
 MOTORS = replace(OWN, feedback="contact_estimate")
-STIFF_SERVO = TransmissionMap.of(WAM).at_joints(CONFIGURATION.shared.servo.integral_gain)
+STIFF_SERVO = WAM.transmission.at_joints(CONFIGURATION.shared.servo.integral_gain)
 LOWER, UPPER = np.array(JOINTS.lower), np.array(JOINTS.upper)
 
 

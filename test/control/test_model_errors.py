@@ -15,7 +15,6 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 
 TRUE = np.array([0.3, -0.2, 0.1])
 SD = 0.25
@@ -312,7 +311,7 @@ def test_an_error_is_what_an_arm_has_more_as_in_the_covariance_of_its_model(
 ) -> None:
     own = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
     own = dataclasses.replace(own, mass_scale=(1.0,) * 4, friction_scale=1.0)
-    shafts, body, shown = TransmissionMap.of(WAM), RigidBody(WAM), []
+    shafts, body, shown = WAM.transmission, RigidBody(WAM), []
     for g, f in ((1.0, 1.0), (weight, friction)):
         observer = MomentumObserver(WAM, own, False)
         for theta in (0.003 * np.arange(300)[:, None] + [2.0, 30.0, 3.0, 9.0]).tolist():

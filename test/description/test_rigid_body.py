@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 L3, L4 = 22 * 0.0254, 16 * 0.0254
@@ -134,7 +133,7 @@ def test_unknown_cover_and_bad_mass_scale_are_refused(arm: Arm, body: RigidBody)
 
 def test_worst_motor_torque_for_ten_pounds_is_below_the_continuous_one(arm: Arm, body: RigidBody) -> None:
     """7.2.2 claims 10 lb at any point in any configuration; the assumed masses must allow it."""
-    matrix = TransmissionMap.of(arm).joint_from_motor
+    matrix = arm.transmission.joint_from_motor
     lower, upper = np.array(arm.joints.lower), np.array(arm.joints.upper)
     worst = 0.0
     for q in np.random.default_rng(1).uniform(lower, upper, (4000, 4)):

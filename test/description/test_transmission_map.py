@@ -12,7 +12,7 @@ N1, N2, N4 = 29.97, 30.40, 19.15
 
 @pytest.fixture(scope="module")
 def transmission() -> TransmissionMap:
-    return TransmissionMap.of(Configuration.load(packaged("wam")).shared.arm)
+    return Configuration.load(packaged("wam")).shared.arm.transmission
 
 
 def random_vectors(count: int) -> list[list[float]]:

@@ -17,7 +17,6 @@ from wam_description.event_text import LESS, sentence
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ForceCommand, State, Wrench
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.limit_watch import LimitWatch, WatchedLimit, excess
 from wam_driver.safety import Mode
@@ -163,7 +162,7 @@ PUSHED = r"push less, or " + re.escape(LESS)
 ])  # fmt: skip
 def test_a_fault_names_the_push_that_acts_or_has_just_acted(ended: float, advice: str) -> None:
     hardware = enabled(**{"driver:tip_speed_limit": 0.5})
-    carried = TransmissionMap.of(ARM).motor_torques(RigidBody(ARM).gravity_torque(ARM.joints.start).tolist())
+    carried = ARM.transmission.motor_torques(RigidBody(ARM).gravity_torque(ARM.joints.start).tolist())
     at_rest = [torque / k for torque, k in zip(carried, ARM.motors.torque_constant, strict=True)]
 
     def play(seconds: float, currents: list[float]) -> None:

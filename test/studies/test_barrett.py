@@ -21,7 +21,6 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.limit_watch import LimitWatch
 from wam_studies.contact.scenarios import ScenarioGenerator
@@ -138,7 +137,7 @@ def test_the_simulated_arm_has_them_too(arm: Arm, written: pin.Model, poses: np.
 
 
 def test_motors_turn_as_the_maker_says_and_power_passes_both_differentials(arm: Arm, poses: np.ndarray) -> None:
-    through, random = TransmissionMap.of(arm), np.random.default_rng(6)
+    through, random = arm.transmission, np.random.default_rng(6)
     for q in poses:
         assert through.motor_positions(q.tolist()) == pytest.approx(motors_of(q.tolist()), abs=1e-12)
         qd, tau = random.uniform(-2.0, 2.0, (2, len(q))).tolist()
@@ -152,7 +151,7 @@ def test_no_motor_may_give_more_than_its_controller_and_the_safety_module_let_it
     counts, gain = (4731, 4731, 4731, 4320, 3900, 3900, 1600), (2700, 2700, 2700, 2700, 6500, 6500, 17474)
     most = [count / each for count, each in zip(counts, gain, strict=True)][: len(arm.motors.names)]
     assert all(0.98 * limit < peak < limit + 1e-4 for peak, limit in zip(arm.motors.peak_torque, most, strict=True))
-    found = TransmissionMap.of(arm).largest_joint_torques(arm.motors.peak_torque)
+    found = arm.transmission.largest_joint_torques(arm.motors.peak_torque)
     assert all(torque < 1.001 * peak for torque, peak in zip(found, PEAK, strict=False)), "the published ones"
 
 
@@ -196,7 +195,7 @@ def test_the_upper_arm_shows_its_moment_only_and_elbow_and_wrist_are_watched(arm
     body = RigidBody(arm)
     assert [name for name in arm.covers.names if not body.moves(name, (0.0, 0.0, 0.0))] == ["upper_arm"]
     q, qd = list(arm.joints.start), [0.5] * len(arm.joints.names)
-    through = TransmissionMap.of(arm)
+    through = arm.transmission
     theta, thetad = through.motor_positions(q), through.motor_velocities(qd)
     none = [0.0] * len(q)
     watched = {one.quantity: one.value for one in LimitWatch(arm, 1e-9, 1e-9).watched(theta, thetad, none, none)}

@@ -11,7 +11,6 @@ from wam_control.contact.contact_inference import Hypothesis
 from wam_description.event import Code, warning
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
 from wam_studies.contact.drives import Drive, arriving, names_payload, record
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
@@ -118,9 +117,7 @@ def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
         for touch in recording.touches:
             if i == round(1e3 * (touch.begin + 0.2)):
                 wrench = touch.wrench(i * 1e-3, WAM.covers)
-                true = wrench @ body.cover_jacobian(
-                    TransmissionMap.of(WAM).joint_positions(state.position), touch.cover
-                )
+                true = wrench @ body.cover_jacobian(WAM.transmission.joint_positions(state.position), touch.cover)
                 products += float(true @ estimator.estimate().external_torques)
                 squares += float(true @ true)
     assert squares > 1.0

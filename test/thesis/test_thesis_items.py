@@ -17,7 +17,6 @@ from own_thesis import INCH, INCH_POUND, OUNCE_INCH_SECOND2, POUND, Node
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_studies.scorecard import measures
 from wam_theory import cable, describing_function, linear_loop, regimes, requisites, resonance, stiction
 from wam_theory import tension_element as element
@@ -169,10 +168,10 @@ def of_equations() -> Iterator[tuple[str, Any, Any]]:
     yield (
         "7.2.2 torque of the motors for 10 lb at the tip",
         torque_for_ten_pounds(),
-        TransmissionMap.of(ARM).joint_from_motor.T @ RigidBody(ARM).tool_jacobian(POSE)[2] * 10.0 * POUND,
+        ARM.transmission.joint_from_motor.T @ RigidBody(ARM).tool_jacobian(POSE)[2] * 10.0 * POUND,
     )
     yield "A (A.3) tip", own.wam_frames(POSE)[-1][:3, 3] * INCH, RigidBody(ARM).tool_pose(POSE).position
-    yield "A (A.6) differential", [[-30.4, -15.2], [30.4, -15.2]], TransmissionMap.of(ARM).motor_from_joint[1:3, 1:3]
+    yield "A (A.6) differential", [[-30.4, -15.2], [30.4, -15.2]], ARM.transmission.motor_from_joint[1:3, 1:3]
     yield "A (A.7) Jacobian", own.wam_jacobian(POSE) * INCH, RigidBody(ARM).tool_jacobian(POSE)
 
 

@@ -11,7 +11,6 @@ from wam_analysis.recording import AnalysedRecording
 from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 from wam_description.parts import Joints, Motors
-from wam_description.transmission_map import TransmissionMap
 
 UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
 MORE = "record different motions, slow and fast, in both directions, over a turn or more of the motors"
@@ -50,7 +49,7 @@ def _configured(shafts: Motors | Joints) -> Numbers:
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> Numbers:
     """Configured friction, (3,), with the joint's if it is part of the measured one; NaN with several joints."""
-    own, column = _configured(arm.motors)[:, i], np.abs(TransmissionMap.of(arm).joint_from_motor[:, i])
+    own, column = _configured(arm.motors)[:, i], np.abs(arm.transmission.joint_from_motor[:, i])
     if alone:
         return own
     if np.count_nonzero(column) > 1:

@@ -21,7 +21,6 @@ from wam_bag.arrays import Mask, Numbers
 from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
-from wam_description.transmission_map import TransmissionMap
 from wam_sim.recorded_run import RecordedRun
 from wam_theory.verdicts import Verdict
 
@@ -276,7 +275,7 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
     found = guarded(parameters, press, node.contact_stiffness)
     moved, seen = math.nan, one.swinging
     if seen is not None and seen.swings.verdict is Verdict.LIMIT_CYCLE:
-        turned = TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre
+        turned = arm.transmission.motor_from_joint @ node.joint_per_metre
         ratio = abs(dict(zip(arm.motors.names, turned.tolist(), strict=True)).get(seen.shaft, 0.0))
         moved = seen.swings.peak_to_peak / ratio if ratio else math.nan
     return Theory(predicted, found, moved)

@@ -22,7 +22,6 @@ from wam_control.force.stability_guard import GuardAssessment, GuardedContact, S
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_theory import linear_loop, regimes, stiction
 
 
@@ -86,7 +85,7 @@ def node_at(recorded: PredictionParameters, press: PressedPoint) -> Node | None:
     square = float(along @ along)
     if square <= 1e-6:
         return None
-    at_joints = TransmissionMap.of(arm).at_joints
+    at_joints = arm.transmission.at_joints
     stiffness, cables = (at_joints([getattr(one, name) for one in arm.circuits]) for name in ("stiffness", "damping"))
     inertia = body.mass_matrix(q) + np.diag(arm.joints.armature)
     gives, servo = float(along @ np.linalg.solve(stiffness, along)), recorded.servo

@@ -15,7 +15,6 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers, Times
 from wam_description.arm import Arm
-from wam_description.transmission_map import TransmissionMap
 from wam_sim.recorded_run import RecordedRun
 
 LACKING = "Friction and efficiency cannot be evaluated: {} in this bag."
@@ -85,7 +84,7 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
     at_joints, sampled = loads[load_from]
     forward = np.concatenate(([True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]))  # time that a reset repeats
     rows = np.flatnonzero(np.all(np.isfinite(at_joints), axis=1) & forward)
-    matrix = TransmissionMap.of(arm).joint_from_motor
+    matrix = arm.transmission.joint_from_motor
     use = ~run.braked(stamps[rows], SHAFT.release)  # not before the cables have taken the load
     caveats: tuple[str, ...] = ()
     if load_from == GRAVITY:
@@ -249,7 +248,7 @@ def _unrecorded(signals: TransmissionSignals) -> Numbers:
     passed = signals.torque - signals.rotors
     straight = np.column_stack([np.interp(time, time[rows], one[rows]) for one in passed.T])
     late = 0.5 * np.median(np.diff(time)) * np.gradient(signals.load, time, axis=0)
-    matrix = TransmissionMap.of(signals.arm).joint_from_motor
+    matrix = signals.arm.transmission.joint_from_motor
     apart = np.nan_to_num(signals.joint_velocity - signals.velocity @ matrix.T) * (signals.load_from != CABLE)
     return np.stack([late, passed - straight, apart * signals.arm.joints.viscous_friction @ matrix], axis=2)
 

@@ -18,7 +18,6 @@ from wam_analysis.identification.unknowns import DIRECTIONS, Unknowns, unknowns,
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers, Rows
 from wam_description.arm import Shared
-from wam_description.transmission_map import TransmissionMap
 
 NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
 
@@ -134,7 +133,7 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
 
 def _still(shared: Shared, regressor: Regressor) -> list[int]:
     """Joints of which a motor does not move enough to show their torques."""
-    moves, matrix = regressor.is_used.any(0), TransmissionMap.of(shared.arm).joint_from_motor
+    moves, matrix = regressor.is_used.any(0), shared.arm.transmission.joint_from_motor
     return [j for j, row in enumerate(matrix) if not moves[row != 0.0].all()]
 
 

@@ -14,7 +14,6 @@ from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
 from wam_description.rigid_body import INERTIA, RigidBody, point_mass
-from wam_description.transmission_map import TransmissionMap
 
 STEP = 1e-6  # kg, kg m, kg m^2, of a link, by which the slopes of its parameters are found
 
@@ -53,7 +52,7 @@ class Regressor:
 
     def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, least: float = 0.0) -> None:
         self._shared, self.unknowns, self._motion = shared, unknowns, motion
-        self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
+        self._matrix = shared.arm.transmission.joint_from_motor
         # friction of joints with a motor of their own at that motor, N m: the cables transmit it
         own = np.abs(self._matrix) * [[j not in unknowns.joints] for j in range(len(self._matrix))]
         self._through = own.T @ shared.arm.joints.dynamic_friction

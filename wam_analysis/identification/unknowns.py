@@ -16,7 +16,6 @@ from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Numbers
 from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 
 DIRECTIONS = ("positive", "negative")
 AXES = ("x", "y", "z")
@@ -64,7 +63,7 @@ def unknowns(shared: Shared) -> Unknowns:
     'static' is F_s - F_c here, which the torque is linear in, until `static_friction` adds F_c.
     """
     arm, model = shared.arm, shared.model
-    matrix = TransmissionMap.of(arm).joint_from_motor
+    matrix = arm.transmission.joint_from_motor
     joints = shared_joints(matrix)
     lumped = np.abs(matrix) * [[j not in joints] for j in range(len(matrix))]
     motors, at_joints, links = model.motors, model.joints, model.links

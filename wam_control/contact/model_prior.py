@@ -11,7 +11,6 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
 from wam_description.rigid_body import Array
-from wam_description.transmission_map import TransmissionMap
 
 WAYS = ("positive", "negative")
 
@@ -64,7 +63,7 @@ def model_prior(
     low, high = given.payload
     # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
     payload_sd = (high - low) / math.sqrt(3.0) if high or use_joint_sensors else given.payload_uncertainty
-    driven_by = np.count_nonzero(TransmissionMap.of(arm).joint_from_motor, axis=1)
+    driven_by = np.count_nonzero(arm.transmission.joint_from_motor, axis=1)
     loads = [*[given.load_uncertainty] * n, *np.where(driven_by > 1, given.load_uncertainty, 0.0)]
     # of each kind: names, standard deviations, what is tolerable
     kinds: list[tuple[list[str], float | list[float], float]] = [

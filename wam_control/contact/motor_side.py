@@ -14,7 +14,6 @@ from wam_description.model import ArmModel
 from wam_description.rigid_body import Array
 from wam_description.signals import State
 from wam_description.small_matrices import solution
-from wam_description.transmission_map import TransmissionMap
 
 
 class JointSample(NamedTuple):
@@ -69,7 +68,7 @@ class MotorSide:
     """
 
     def __init__(self, arm: Arm, parameters: ObserverParameters, has_dither: bool, model: ArmModel | None) -> None:
-        self.map = TransmissionMap.of(arm)
+        self.map = arm.transmission
         self._squared = np.square(self.map.joint_from_motor)
         self.rotors, self.pulleys = self.map.at_joints(arm.motors.inertia), np.diag(arm.joints.armature)
         self._stiffness = self.map.at_joints([circuit.stiffness for circuit in arm.circuits])

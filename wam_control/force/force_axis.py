@@ -19,7 +19,6 @@ from wam_description.arm import Servo
 from wam_description.parameters import parameter
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.small_matrices import inverse, length, outer
-from wam_description.transmission_map import TransmissionMap
 
 Phasors = NDArray[np.complex128]
 Angles = Sequence[float] | Array  # of the joints (n,), rad
@@ -162,7 +161,7 @@ class ForceAxes:
         arm = body.arm
         self.torque_sd = np.full(len(arm.joints.names), parameters.torque_sd)
         self._body, self.covers, self._parameters = body, arm.covers, parameters
-        self._map = TransmissionMap.of(arm)
+        self._map = arm.transmission
         self._armature = np.diag(arm.joints.armature)
         self._rotors = self._map.at_joints(arm.motors.inertia)
         self._friction = np.array(arm.joints.dynamic_friction)

@@ -30,7 +30,6 @@ from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 from wam_description.signals import Contact
-from wam_description.transmission_map import TransmissionMap
 
 UNKNOWN: Final = "that of `margin`, until a force is commanded"
 
@@ -78,7 +77,7 @@ class Supervision:
         self, arm: Arm, servo: Servo, timing: Timing, parameters: ForceLoopParameters, q: tuple[float, ...]
     ) -> None:
         self.parameters = parameters
-        self.servo_stiffness = TransmissionMap.of(arm).at_joints(servo.integral_gain)
+        self.servo_stiffness = arm.transmission.at_joints(servo.integral_gain)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
         self.guard = StabilityGuard(arm, servo, timing, parameters.guard, parameters.sensing_fed_back)

@@ -24,7 +24,6 @@ from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter
 from wam_description.rigid_body import Array
 from wam_description.signals import Triple
-from wam_description.transmission_map import TransmissionMap
 from wam_theory.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_theory.linear_loop import series_stiffness
 from wam_theory.rounding import rounded_down
@@ -313,7 +312,7 @@ class StabilityGuard:
         return FrictionNode(
             inertia=along(inertia),
             damping=along(np.diag(damping)) if damping.all() else 0.0,
-            transmission_stiffness=along(TransmissionMap.of(self.arm).at_joints(cables)),
+            transmission_stiffness=along(self.arm.transmission.at_joints(cables)),
             contact_stiffness=self.parameters.contact_stiffness,
             dynamic_friction=friction(joints.dynamic_friction),
             static_friction=friction(joints.static_friction),

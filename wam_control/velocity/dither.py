@@ -15,7 +15,6 @@ from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Timing
 from wam_description.parameters import lengths, parameter, require
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ class Dither:
         x = J M^-1 tau/omega^2 with the rotors and pulleys in M, the largest over a cycle; heat
         (tau_rms/tau_continuous)^2.
         """
-        arm, transmission = self._arm, TransmissionMap.of(self._arm)
+        arm, transmission = self._arm, self._arm.transmission
         heat = tuple(
             0.5 * (a / most) ** 2 for a, most in zip(self.amplitude, arm.motors.continuous_torque, strict=True)
         )
@@ -108,7 +107,7 @@ def friction_at_motors(arm: Arm) -> list[float]:
 
     A joint that several motors drive is divided among them in proportion to their transmission ratios.
     """
-    inverse = np.abs(TransmissionMap.of(arm).motor_from_joint)
+    inverse = np.abs(arm.transmission.motor_from_joint)
     share = inverse / inverse.sum(axis=0)
     joints = np.array(arm.joints.static_friction)
     borne = np.divide(share * joints, inverse, out=np.zeros_like(share), where=inverse > 0.0)

@@ -17,7 +17,6 @@ from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import Array
-from wam_description.transmission_map import TransmissionMap
 from wam_theory.rounding import rounded_down, rounded_up
 from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
 
@@ -101,7 +100,7 @@ class ServoGuard:
         The integral gain alone does not brake: it is a spring to the motor.
         """
         motors = self._arm.motors
-        speeds = TransmissionMap.of(self._arm).largest_motor_velocities(self._arm.joints.speed_limit)
+        speeds = self._arm.transmission.largest_motor_velocities(self._arm.joints.speed_limit)
         least = [
             VELOCITY.deadband * peak / speed if speed else 0.0
             for peak, speed in zip(motors.peak_torque, speeds, strict=True)

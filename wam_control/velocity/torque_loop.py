@@ -11,7 +11,6 @@ from wam_description.arm import Shared
 from wam_description.parameters import lengths, parameter
 from wam_description.parts import Motors
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input, Inputs, Outputs, reaction
 
 
@@ -47,7 +46,7 @@ class TorqueLoopNode:
     high_priority = True
 
     def __init__(self, shared: Shared, own: TorqueLoopParameters) -> None:
-        self._loop, self._map = TorqueLoop(shared.arm.motors, own.gain), TransmissionMap.of(shared.arm)
+        self._loop, self._map = TorqueLoop(shared.arm.motors, own.gain), shared.arm.transmission
         self._zero = [0.0] * len(shared.arm.motors.names)
         self.refusals: dict[str, str] = {}
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from wam_description.arm import Arm
 from wam_description.parameters import parameter
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class Transform:
     """
 
     def __init__(self, arm: Arm, creep_correction: bool = False) -> None:
-        self._map = TransmissionMap.of(arm)
+        self._map = arm.transmission
         self._losses = [circuit.loss_per_torque for circuit in arm.circuits] if creep_correction else []
         self._creep = [0.0] * len(self._losses)
         self._before: list[float] = []

@@ -8,7 +8,6 @@ from wam_control.velocity.servo_guard import ServoGuard
 from wam_control.velocity.velocity_loop import SERVO_REACTION, VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Shared
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Inputs, Outputs
 
 
@@ -25,7 +24,7 @@ class VelocityLoopNode:
         self.tune(own)
         zero = [0.0] * len(shared.arm.motors.names)
         self._motors = shared.arm.motors.names
-        self._fastest = TransmissionMap.of(shared.arm).largest_motor_velocities(shared.arm.joints.speed_limit)
+        self._fastest = shared.arm.transmission.largest_motor_velocities(shared.arm.joints.speed_limit)
         self.refusals: dict[str, str] = {}
         self._at_rest, self._no_effort = State([], zero, []), State([], [], zero)
         self._command, self._velocity = self._at_rest, zero  # and within the limits, rad/s

@@ -7,7 +7,6 @@ from collections.abc import Generator, Iterator, Sequence
 from enum import Enum
 
 from wam_description.arm import Arm
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.bus import properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.frames import SAFETY, BusGroup
@@ -47,7 +46,7 @@ class StartUp(Host):
 
     def __init__(self, line: Line, arm: Arm, home: Sequence[float], is_zero_lost: bool = False) -> None:
         super().__init__(line)
-        self._home, self._is_zero_lost = TransmissionMap.of(arm).motor_positions(home), is_zero_lost
+        self._home, self._is_zero_lost = arm.transmission.motor_positions(home), is_zero_lost
         self._constant = arm.motors.torque_constant
         self._motors = range(1, len(self._home) + 1)
         self.is_at_home, self.woken = False, list[int]()

@@ -8,7 +8,6 @@ from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panel, Panels, line_only
 
@@ -42,8 +41,8 @@ class Backdriving:
     """
 
     def __init__(self, arm: Arm) -> None:
-        self._body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint
-        self.rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
+        self._body, gears = RigidBody(arm), arm.transmission.motor_from_joint
+        self.rotors = arm.transmission.at_joints(arm.motors.inertia)
         self.friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
         self._armature = np.diag(arm.joints.armature)
         directions = np.random.default_rng(CASE.backdriven_seed).normal(size=(CASE.backdriven_directions, 3))

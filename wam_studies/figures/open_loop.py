@@ -10,7 +10,6 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Ripples
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_studies.figures.conditions import CASE
@@ -51,7 +50,7 @@ class OpenLoopArm:
         ripples = (CASE.ripple,) * len(currents)
         self._amplifier_parameters = replace(driver.amplifier, deadband=currents, torque_ripple=ripples)
         self._constant = constant
-        self._to_motors = TransmissionMap.of(self.arm).joint_from_motor.T
+        self._to_motors = self.arm.transmission.joint_from_motor.T
         self._body = RigidBody(self.arm)
 
     def error(self, q: tuple[float, ...], force: Numbers) -> float:

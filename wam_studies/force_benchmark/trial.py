@@ -12,7 +12,6 @@ from wam_description.configuration import Configuration
 from wam_description.event import Code, Event, Level
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_driver.loads import contact_force
 from wam_sim.simulation import Simulation
@@ -205,5 +204,5 @@ def knowable(base: Configuration, task: Task) -> float:
 
 def inertia(arm: Arm, body: RigidBody, q: list[float]) -> Array:
     """Inertia at the joints, (n, n), kg m^2: links, pulleys, and rotors as if the cables were stiff."""
-    rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
+    rotors = arm.transmission.at_joints(arm.motors.inertia)
     return body.mass_matrix(q) + np.diag(arm.joints.armature) + rotors

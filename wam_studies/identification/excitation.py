@@ -20,7 +20,6 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, build_part, rows
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_description.world import Obstacles
 
 
@@ -161,7 +160,7 @@ class _Space:
 
 def _information(shared: Shared, points: MovePoints) -> Array:
     """Information that a move gives about the parameters."""
-    inverse = TransmissionMap.of(shared.arm).motor_from_joint
+    inverse = shared.arm.transmission.motor_from_joint
     theta, thetad, thetadd = (values @ inverse.T for values in points[1:])
     body = RigidBody(shared.arm)
     joints = np.array([body.inverse_dynamics(*each) for each in zip(*points[1:], strict=True)])

@@ -14,7 +14,6 @@ from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.parameters import each
 from wam_description.rigid_body import Array
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 
 Values = dict[str, Any]  # of a configuration, by name
@@ -228,7 +227,7 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     driver = configuration.node("driver", DriverParameters)
     shared, law = configuration.shared, driver.friction
     arm = true_arm(shared.arm, driver.mismatch)
-    matrix = TransmissionMap.of(arm).joint_from_motor
+    matrix = arm.transmission.joint_from_motor
     n = len(matrix)
     own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
     lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)

@@ -17,7 +17,6 @@ from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.parameters import parameter
 from wam_description.rigid_body import Array, RigidBody
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
 from wam_studies.harness import Study
 from wam_studies.identification.excitation import moves, path
@@ -118,7 +117,7 @@ def play(
     shared = configuration.shared
     driver = Driver(shared, configuration.node("driver", DriverParameters))
     driver.safety.enable("")
-    period, matrix = shared.timing.period, TransmissionMap.of(shared.arm).joint_from_motor
+    period, matrix = shared.timing.period, shared.arm.transmission.joint_from_motor
     k_p, k_i = (np.array(gain) for gain in (shared.servo.proportional_gain, shared.servo.integral_gain))
     body, inverse = RigidBody(shared.model_arm), np.linalg.inv(matrix)
     stamps, rows = [], []
