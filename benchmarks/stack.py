@@ -75,7 +75,7 @@ def bare(configuration: Configuration, length: float) -> float:
     arm, step = shared.arm, shared.timing.substep
     model = mujoco.MjModel.from_xml_string(mjcf(arm, step, driver.world, driver.effects))
     data = mujoco.MjData(model)
-    n, transmission = len(arm.joints.names), arm.transmission
+    n, transmission = arm.n, arm.transmission
     data.qpos[n : 2 * n] = arm.joints.start
     data.qpos[:n] = transmission.motor_from_joint @ arm.joints.start
     data.ctrl[:] = transmission.motor_torques(RigidBody(arm).gravity_torque(arm.joints.start).tolist())

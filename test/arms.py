@@ -48,7 +48,7 @@ def _replaced(part: Any, values: Mapping[str, Any] | None) -> Any:
 
 def frictionless(arm: Arm, start: tuple[float, ...] | None = None, damping: float = 0.0) -> Arm:
     """No dry, no viscous friction; cable damping scaled."""
-    zero = dict.fromkeys(FRICTIONS, (0.0,) * len(arm.joints.names))
+    zero = dict.fromkeys(FRICTIONS, (0.0,) * arm.n)
     return changed(
         arm,
         motors=zero,

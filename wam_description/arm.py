@@ -96,7 +96,7 @@ class Arm:
         motors, joints, links = self.motors.names, self.joints.names, self.links.names
         lengths("arm", motors, {"joints.names": joints, "links.names": links})
         lengths("arm", motors, {"joint_from_motor": self.joint_from_motor}, width=len(joints))
-        condition = float(np.linalg.cond(np.reshape(self.joint_from_motor, (len(joints), len(motors)))))
+        condition = float(np.linalg.cond(np.reshape(self.joint_from_motor, (self.n, self.n))))
         require(
             condition < MODEL.condition,
             f"parameter 'arm.joint_from_motor' is singular (condition number {condition:.3g}, allowed below "
@@ -214,9 +214,14 @@ class Arm:
         return circuits(self.motors.names, self.transmission.motor_from_joint, self.cables)
 
     @property
+    def n(self) -> int:
+        """Number of motors, of joints and of links."""
+        return len(self.joints.names)
+
+    @property
     def transmission(self) -> TransmissionMap:
         """The map between motors and joints."""
-        return TransmissionMap(np.reshape(self.joint_from_motor, (len(self.joints.names), -1)))
+        return TransmissionMap(np.reshape(self.joint_from_motor, (self.n, self.n)))
 
 
 @dataclass(frozen=True)

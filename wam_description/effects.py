@@ -160,7 +160,7 @@ def no_effects(arm: Arm) -> Effects:
         backlash=(0.0,),
         slack=False,
         pretension_share=(1.0,),
-        tension_friction=(0.0,) * len(arm.motors.names),
+        tension_friction=(0.0,) * arm.n,
         included_in_friction=False,
-        added_coulomb_friction=(0.0,) * len(arm.joints.names),
+        added_coulomb_friction=(0.0,) * arm.n,
     )

@@ -55,7 +55,7 @@ class RigidBody:
     def __init__(self, arm: Arm, mass_scale: Sequence[float] | None = None) -> None:
         self.arm = arm
         self.covers = arm.covers.names
-        self._model = _model(arm, [1.0] * len(arm.links.names) if mass_scale is None else mass_scale)
+        self._model = _model(arm, [1.0] * arm.n if mass_scale is None else mass_scale)
         self._data = self._model.createData()
         self._tool = self._model.getFrameId("tool")
         self._frame = {name: self._model.getFrameId(name) for name in self.covers}
@@ -210,10 +210,8 @@ def _vector(values: ArrayLike) -> Array:
 
 
 def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:
-    if len(mass_scale) != len(arm.links.names) or not all(factor > 0.0 for factor in mass_scale):
-        raise ValueError(
-            f"mass_scale is {list(mass_scale)}; it needs {len(arm.links.names)} factors above 0, one per link"
-        )
+    if len(mass_scale) != arm.n or not all(factor > 0.0 for factor in mass_scale):
+        raise ValueError(f"mass_scale is {list(mass_scale)}; it needs {arm.n} factors above 0, one per link")
     model = pin.Model()
     model.name = arm.name
     model.gravity.linear = np.array(arm.gravity)

@@ -50,7 +50,7 @@ class CableCircuits:
     """
 
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
-        n = len(arm.motors.names)
+        n = arm.n
         self._capstan = effects.capstan
         self.is_bounded = (effects.creep and effects.terminated) or effects.capstan > 0.0
         self.is_slack = False

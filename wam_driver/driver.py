@@ -112,7 +112,7 @@ class Driver:
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
         self._arm, self.timing, self.parameters, self._push_excess = arm, timing, parameters, shared.push_excess
         self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
-        self._zero = [0.0] * len(arm.motors.names)
+        self._zero = [0.0] * arm.n
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
         self._disturbed, self._disturbed_until = "", 0  # cover that a message pushes, and the last tick
         self._last_push = "", 0  # the last pushes of an enabled arm, in words, and the tick in which they acted

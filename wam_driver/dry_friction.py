@@ -43,7 +43,7 @@ class DryFriction:
         self, arm: Arm, effects: Effects, parameters: FrictionParameters, step: float, compliance: Sequence[float]
     ) -> None:
         motors, joints = effects.dry(arm), arm.joints
-        size = 2 * len(motors.names)
+        size = 2 * arm.n
         parameters.require_fit(arm)
         static = [*motors.static_friction, *joints.static_friction]
         dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]

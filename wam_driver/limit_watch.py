@@ -72,7 +72,7 @@ class LimitWatch:
             *self._of_cables,
         ]
         self._limits = self._with_travel(self._half)
-        self._beyond = [0.0] * len(joints.names)  # rad from the middle, up to which each joint may be beyond a stop
+        self._beyond = [0.0] * arm.n  # rad from the middle, up to which each joint may be beyond a stop
 
     def _with_travel(self, travel: Sequence[float]) -> list[float]:
         """The limits of all quantities, with those of the travel, (n,), rad."""

@@ -72,7 +72,7 @@ class CoverLoads:
         owners = {geom: name for name in arm.covers.names for geom in (name, folded(name))}
         geoms = {i: model.geom(i).name for i in range(model.ngeom)}
         self._cover_of_geom = {i: owners[geom] for i, geom in geoms.items() if geom in owners}
-        tendons = enumerate(springs.present, 2 * len(arm.motors.names))  # after the strands of the cables
+        tendons = enumerate(springs.present, 2 * arm.n)  # after the strands of the cables
         self._springs = [(tendon, sprung_cover(arm, spring.joint), spring) for tendon, spring in tendons]
         self.pushes: dict[str, AppliedPush] = {}
         turned = np.zeros(6)

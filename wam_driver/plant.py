@@ -111,7 +111,7 @@ class Plant:
         self.model = mujoco.MjModel.from_xml_string(self._xml_of(arm))
         self.data = mujoco.MjData(self.model)
         mujoco.set_mju_user_warning(_unheard)
-        n = self._n = len(arm.motors.names)
+        n = self._n = arm.n
         self._brakes, self._effects = [brake_torque] * n, effects
         self._arm, self._carried = arm, 0.0
         self._map = arm.transmission

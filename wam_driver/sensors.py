@@ -56,7 +56,7 @@ class Sensors:
 
     def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
         parameters.require_fit(arm)
-        n = len(arm.motors.names)
+        n = arm.n
         self.motors = SideSensors(parameters.encoder_resolution, parameters.encoder_noise, (0.0,) * n, random)
         resolution = each(parameters.joint_encoder_resolution, n)
         self.joints = SideSensors(resolution, parameters.joint_encoder_noise, parameters.strain_noise, random)

@@ -74,7 +74,7 @@ def _grows(kick: Array, drag: Array, step: float) -> bool:
 
 def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     """The arm alone, then with each cover pressed on each surface, at the start and with all joints at 0."""
-    n = len(arm.joints.names)
+    n = arm.n
     data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     cables = np.hstack([np.eye(n), -arm.transmission.motor_from_joint, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables

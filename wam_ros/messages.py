@@ -62,7 +62,7 @@ def reader(topic: Topic, arm: Arm) -> Read:
 
 def most_rows(topic: Topic, arm: Arm) -> int:
     """Rows that a table of a topic may have, so that a step takes its usual time: of a task one for each joint."""
-    return len(arm.joints.names) if topic.columns == TASK_COLUMNS else NODE_LIMITS.table_rows
+    return arm.n if topic.columns == TASK_COLUMNS else NODE_LIMITS.table_rows
 
 
 def joint_state(stamp: int, names: Sequence[str], state: State) -> JointState:

@@ -91,7 +91,7 @@ class Simulation:
                 self._connect(declaration, scenario)
             elif name != "driver":
                 self._connect(declaration)
-        self._motors = len(shared.arm.motors.names)
+        self._motors = shared.arm.n
         if FORCE_LOOP in self.nodes:
             self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)

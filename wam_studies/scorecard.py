@@ -140,7 +140,7 @@ def coupled_bandwidth(arm: Arm, links: Array, levers: Array, stiffness: float) -
     levers : of directions at the tip, (directions, joints), m.
     stiffness : of the contact, N/m.
     """
-    n = len(arm.motors.names)
+    n = arm.n
     stretch = np.hstack([np.eye(n), -arm.transmission.motor_from_joint])
     cables = stretch.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ stretch
     inertia = np.block([[np.diag(arm.motors.inertia), np.zeros((n, n))], [np.zeros((n, n)), links]])

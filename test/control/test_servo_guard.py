@@ -24,7 +24,7 @@ EMPTY = World(Obstacles((), (), (), (), (), (), (), (), ()), NO_SPRINGS)
 
 def smooth(arm: Arm, held: bool = False) -> Arm:
     """The arm without dry friction and weight, so that MuJoCo is linear near rest; `held`: with heavy links."""
-    none = (0.0,) * len(arm.joints.names)
+    none = (0.0,) * arm.n
     heavy = (1e3,) * len(none) if held else arm.joints.armature
     return replace(
         arm,
@@ -45,7 +45,7 @@ class SampledPlant:
         self.plant = Plant(self.arm, EMPTY, no_effects(self.arm), shared.timing.period / substeps)
         self.plant.brake(False)
         self._own = configuration.node("velocity_loop", VelocityLoopParameters)
-        self._n, self._substeps = len(self.arm.motors.names), substeps
+        self._n, self._substeps = self.arm.n, substeps
         self._delay, self._by_difference = delay, by_difference
         self.rest = np.concatenate([self.plant.data.qpos, np.zeros(2 * self._n)])
 
@@ -165,7 +165,7 @@ GAINS = re.compile(r"servo\.(\w+) up to \[([^]]*)\]")
 def test_gains_that_hold_nothing_are_refused_with_the_least_that_is_allowed(
     configuration: Configuration, proportional: float, integral: float
 ) -> None:
-    guard, n = guard_of(configuration), len(configuration.shared.arm.motors.names)
+    guard, n = guard_of(configuration), configuration.shared.arm.n
     with pytest.raises(ParameterError, match=r"arm: motor1 at .* rad/s.* allowed: at least \[") as refusal:
         guard.require_stable(Servo((proportional,) * n, (integral,) * n))
     named = str(refusal.value).rpartition("at least [")[2].partition("]")[0]

@@ -71,7 +71,7 @@ class Rig:
         arm = self.shared.arm
         self.bus = SimulatedBus(self.shared, own, version, self.plant)
         self.arm = ArmBus(via(self.bus), arm, PERIOD, arm.joints.start)
-        self.currents = [0.1 + 0.05 * at for at in range(len(arm.motors.names))]
+        self.currents = [0.1 + 0.05 * at for at in range(arm.n)]
 
     def start(self, most: float = 5.0) -> list[Wait]:
         """Until it runs or there is a fault; what was waited for."""

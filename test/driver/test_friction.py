@@ -61,7 +61,7 @@ def with_friction(motor: float = 0.0, joint: tuple[float, float] = (0.0, 0.0), *
 
 
 def released(arm: Arm, friction: FrictionParameters, added: float = 0.0, step: float = STEP) -> Plant:
-    effects = dataclasses.replace(no_effects(arm), added_coulomb_friction=(added,) * len(arm.joints.names))
+    effects = dataclasses.replace(no_effects(arm), added_coulomb_friction=(added,) * arm.n)
     plant = Plant(arm, World(NOWHERE, NO_SPRINGS), effects, step, friction)
     plant.brake(False)
     return plant

@@ -94,12 +94,12 @@ def written(arm: Arm) -> pin.Model:
 
 @pytest.fixture(scope="module")
 def poses(arm: Arm) -> np.ndarray:
-    return np.random.default_rng(5).uniform(arm.joints.lower, arm.joints.upper, (50, len(arm.joints.names)))
+    return np.random.default_rng(5).uniform(arm.joints.lower, arm.joints.upper, (50, arm.n))
 
 
 def test_tool_and_links_are_where_the_makers_rows_put_them(arm: Arm, written: pin.Model, poses: np.ndarray) -> None:
     body, data = RigidBody(arm), written.createData()
-    end = "plate" if len(arm.joints.names) == len(SHOULDER) else "body5"
+    end = "plate" if arm.n == len(SHOULDER) else "body5"
     shoulder, elbow, end_of_forearm = (written.getFrameId(name) for name in ("turn2", "body4", end))
     for q in poses:
         pin.framesForwardKinematics(written, data, q)
@@ -124,7 +124,7 @@ def test_gravity_and_inertia_are_those_of_the_makers_links(arm: Arm, written: pi
 
 def test_the_simulated_arm_has_them_too(arm: Arm, written: pin.Model, poses: np.ndarray) -> None:
     """MuJoCo turns the inertia into principal axes by itself."""
-    n = len(arm.joints.names)
+    n = arm.n
     model = mujoco.MjModel.from_xml_string(mjcf(arm, 0.0005, World(NOWHERE, NO_SPRINGS), no_effects(arm)))
     data, own, full = mujoco.MjData(model), written.createData(), np.zeros((2 * n, 2 * n))
     for q in poses[:10]:
@@ -149,7 +149,7 @@ def test_motors_turn_as_the_maker_says_and_power_passes_both_differentials(arm: 
 def test_no_motor_may_give_more_than_its_controller_and_the_safety_module_let_it(arm: Arm) -> None:
     """4731 counts are the warning of the safety module, 4320, 3900 and 1600 the clipping of the controllers."""
     counts, gain = (4731, 4731, 4731, 4320, 3900, 3900, 1600), (2700, 2700, 2700, 2700, 6500, 6500, 17474)
-    most = [count / each for count, each in zip(counts, gain, strict=True)][: len(arm.motors.names)]
+    most = [count / each for count, each in zip(counts, gain, strict=True)][: arm.n]
     assert all(0.98 * limit < peak < limit + 1e-4 for peak, limit in zip(arm.motors.peak_torque, most, strict=True))
     found = arm.transmission.largest_joint_torques(arm.motors.peak_torque)
     assert all(torque < 1.001 * peak for torque, peak in zip(found, PEAK, strict=False)), "the published ones"
@@ -169,13 +169,13 @@ def test_a_contact_is_found_on_every_link_that_shows_its_position(arm: Arm, writ
     body, data, random = RigidBody(arm), written.createData(), np.random.default_rng(7)
     own = CONFIGURATIONS[arm.name].node("contact_estimator", ContactEstimatorParameters).inference
     inference = ContactInference(arm, body, own)
-    precision = 1e4 * np.eye(len(arm.joints.names))
+    precision = 1e4 * np.eye(arm.n)
     carriers = dict(zip(arm.covers.names, arm.covers.links, strict=True))
     for name in arm.covers.names[1:]:
         i = arm.covers.names.index(name)
         frame = written.getFrameId(f"turn{carriers[name].removeprefix('link')}")
         for share in (0.3, 0.5, 0.8):
-            q = random.uniform(0.4, 0.9, len(arm.joints.names))
+            q = random.uniform(0.4, 0.9, arm.n)
             pose, place = body.cover_pose(q, name), share * arm.covers.length[i]
             force = pose.rotation @ [0.0, 6.0, 5.0]
             pin.computeJointJacobians(written, data, q)
@@ -194,7 +194,7 @@ def test_a_contact_is_found_on_every_link_that_shows_its_position(arm: Arm, writ
 def test_the_upper_arm_shows_its_moment_only_and_elbow_and_wrist_are_watched(arm: Arm) -> None:
     body = RigidBody(arm)
     assert [name for name in arm.covers.names if not body.moves(name, (0.0, 0.0, 0.0))] == ["upper_arm"]
-    q, qd = list(arm.joints.start), [0.5] * len(arm.joints.names)
+    q, qd = list(arm.joints.start), [0.5] * arm.n
     through = arm.transmission
     theta, thetad = through.motor_positions(q), through.motor_velocities(qd)
     none = [0.0] * len(q)

@@ -117,7 +117,7 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     sought = unknowns(shared)
     regressor = Regressor(shared, sought, motion, IDENTIFY.least_motion)
     still = _still(shared, regressor)
-    if len(still) == len(shared.arm.joints.names):
+    if len(still) == shared.arm.n:
         raise ValueError(
             f"no joint turns freely for {IDENTIFY.least_motion:g} s: let each motor turn, faster than "
             f"{IDENTIFY.slowest_motor:g} rad/s, in both directions"

@@ -114,7 +114,7 @@ def unknowns(shared: Shared) -> Unknowns:
 
 def with_kept_weight(sought: Unknowns, shared: Shared, still: Sequence[int]) -> Unknowns:
     """The same where the weight of the links at some joints stays as configured: the motion does not show it."""
-    arm, rest = shared.arm, np.zeros(len(shared.arm.joints.names))
+    arm, rest = shared.arm, np.zeros(shared.arm.n)
     random = np.random.Generator(np.random.PCG64(IDENTIFY.seed))
     poses = random.uniform(arm.joints.lower, arm.joints.upper, (IDENTIFY.poses, len(rest)))
     body, groups = RigidBody(arm), ("links.mass", *(f"links.moment_{axis}" for axis in AXES))

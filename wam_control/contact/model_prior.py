@@ -58,7 +58,7 @@ def model_prior(
     model : the identified one, if there is any.
     use_joint_sensors : whether the torques are those of joint sensors.
     """
-    n, shafts, joints = len(arm.joints.names), [*arm.motors.names, *arm.joints.names], arm.joints.names
+    n, shafts, joints = arm.n, [*arm.motors.names, *arm.joints.names], arm.joints.names
     # the load friction of a joint that one motor drives is that of the motor
     low, high = given.payload
     # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
@@ -114,7 +114,7 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
 
     Errors of joints in both directions are one identified parameter, errors of load the mean of two.
     """
-    n, motors, joints = len(arm.joints.names), arm.motors.names, arm.joints.names
+    n, motors, joints = arm.n, arm.motors.names, arm.joints.names
     known = model.covariance.parameters
     mixing = np.zeros((len(errors), len(known)))
 

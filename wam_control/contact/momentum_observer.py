@@ -73,7 +73,7 @@ class MomentumObserver:
         model: ArmModel | None = None,
     ) -> None:
         parameters.require_fit(arm)
-        n = self._n = len(arm.joints.names)
+        n = self._n = arm.n
         self._parameters = parameters
         self.body = RigidBody(arm, parameters.mass_scale)
         self._side = side = MotorSide(arm, parameters, cycle > 0, model)

@@ -159,7 +159,7 @@ class ForceAxes:
 
     def __init__(self, body: RigidBody, parameters: SensingParameters) -> None:
         arm = body.arm
-        self.torque_sd = np.full(len(arm.joints.names), parameters.torque_sd)
+        self.torque_sd = np.full(arm.n, parameters.torque_sd)
         self._body, self.covers, self._parameters = body, arm.covers, parameters
         self._map = arm.transmission
         self._armature = np.diag(arm.joints.armature)

@@ -94,7 +94,7 @@ class ForceLoop:
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._feedback = ""  # none so far
         self._pushed = PushedArm(self._body)
-        zero = self._velocity = self._moved = np.zeros(len(arm.joints.names))
+        zero = self._velocity = self._moved = np.zeros(arm.n)
         self._pose = np.zeros(0)  # none so far
         self._pressed_at = zero + math.inf
         self.events: tuple[Event, ...] = ()

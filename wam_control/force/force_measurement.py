@@ -114,7 +114,7 @@ class ForceMeasurement:
 
     @property
     def _none(self) -> Array:
-        return np.zeros(len(self._body.arm.joints.names))
+        return np.zeros(self._body.arm.n)
 
     def _torque(self, own: ForceLoopParameters, given: ForceInput) -> Array:
         sensors = given.sensors

@@ -67,7 +67,7 @@ class SampledLoop:
     """
 
     def __init__(self, arm: Arm, timing: Timing, servo: Servo) -> None:
-        n = len(arm.joints.names)
+        n = arm.n
         self.body = RigidBody(arm)
         self.joint_from_motor = np.reshape(arm.joint_from_motor, (n, n))
         self.motor_from_joint = np.linalg.inv(self.joint_from_motor)

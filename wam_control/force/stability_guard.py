@@ -349,7 +349,7 @@ class StabilityGuard:
 
     def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
         timing = self.timing
-        n = len(self.arm.joints.names)
+        n = self.arm.n
         delay = task.delay_samples * timing.outer_divisor + timing.outer_delay + late
         if isinstance(contact, GuardedForces):
             return Axes(*contact[1:-1], task.filter_time, delay)

@@ -517,7 +517,7 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
     step = ScenarioStep(
         name=body["name"],
         seconds=body["seconds"],
-        posture=numbers(where, "posture", body["posture"], len(arm.joints.names)) if "posture" in body else (),
+        posture=numbers(where, "posture", body["posture"], arm.n) if "posture" in body else (),
         until_force=body.get("until_force", 0.0),
         force=_force(where, body["force"], arm) if "force" in body else NO_FORCE,
         push=_push(where, body["push"], body["seconds"]) if "push" in body else None,
@@ -579,7 +579,7 @@ def _require_step(where: str, step: Any, shared: Shared) -> None:
     _require_one(where, moves)
     _require_one(where, forces)
     require(
-        not moves or step.task is None or len(step.task.axes) < len(arm.joints.names),
+        not moves or step.task is None or len(step.task.axes) < arm.n,
         f"{where}: {' and '.join((*moves, *forces))} are given; the {' '.join(forces)} leaves no joint free to move; "
         "give one of them, or a task with fewer axes",
     )
@@ -601,7 +601,7 @@ def _require_trajectory(where: str, trajectory: Any, arm: Arm) -> None:
         _require_posture(where, point.position, arm)
         require_list(where, "velocity", point.velocity, "joint speeds")
         if point.velocity:
-            numbers(where, "velocity", point.velocity, len(arm.joints.names))
+            numbers(where, "velocity", point.velocity, arm.n)
         number(where, "times", point.time)
 
 
@@ -620,7 +620,7 @@ def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
 
 
 def _require_posture(where: str, given: Any, arm: Arm) -> None:
-    beyond = arm.joints.beyond(numbers(where, "posture", given, len(arm.joints.names)))
+    beyond = arm.joints.beyond(numbers(where, "posture", given, arm.n))
     require(not beyond, f"{where}: posture: {beyond}")
 
 

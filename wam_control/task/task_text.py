@@ -43,7 +43,7 @@ KINDS: Final = (*(kind.name.lower() for kind in AxisKind), "free")
 
 def torque_task(where: str, body: Any, arm: Arm) -> TaskCommand:
     """A torque of each joint, N m."""
-    return TaskCommand(BASE, joint_axes(AxisKind.FORCE, numbers(where, "torque", body, len(arm.joints.names))))
+    return TaskCommand(BASE, joint_axes(AxisKind.FORCE, numbers(where, "torque", body, arm.n)))
 
 
 def task_of_text(where: str, body: Any, arm: Arm) -> TaskCommand:

@@ -64,7 +64,7 @@ class PositionLoopNode:
     def __init__(self, shared: Shared, own: ServoGuardParameters) -> None:
         ServoGuard(shared.model_arm, shared.timing, own).require_stable(shared.servo)
         self._loop = PositionLoop(shared.arm.motors, shared.servo)
-        self._zero = [0.0] * len(shared.arm.motors.names)
+        self._zero = [0.0] * shared.arm.n
 
     @SERVO_REACTION
     def step(self, inputs: Inputs) -> Outputs:

@@ -140,7 +140,7 @@ class ServoGuard:
     def _mechanisms(self) -> tuple[Mechanism, ...]:
         """The rotors with the links held, and with the links free in some poses."""
         arm = self._arm
-        n = len(arm.joints.names)
+        n = arm.n
         loop = SampledLoop(arm, self._timing, Servo((0.0,) * n, (0.0,) * n))
         held = locked_rotors(
             arm.motors.inertia,

@@ -47,7 +47,7 @@ class TorqueLoopNode:
 
     def __init__(self, shared: Shared, own: TorqueLoopParameters) -> None:
         self._loop, self._map = TorqueLoop(shared.arm.motors, own.gain), shared.arm.transmission
-        self._zero = [0.0] * len(shared.arm.motors.names)
+        self._zero = [0.0] * shared.arm.n
         self.refusals: dict[str, str] = {}
 
     @reaction(

@@ -24,7 +24,7 @@ class TransformNode:
 
     def __init__(self, shared: Shared, own: TransformParameters) -> None:
         self._transform = Transform(shared.arm, own.creep_correction)
-        self._no_effort = State([], [], [0.0] * len(shared.arm.joints.names))
+        self._no_effort = State([], [], [0.0] * shared.arm.n)
         self._limit = shared.ages.limit_ns("feedback")
         self._velocity_stamp = 0  # ns, newest velocity command
         self._since = math.inf  # ns, first torque without one

@@ -22,7 +22,7 @@ class VelocityLoopNode:
         self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
         self._shared = shared
         self.tune(own)
-        zero = [0.0] * len(shared.arm.motors.names)
+        zero = [0.0] * shared.arm.n
         self._motors = shared.arm.motors.names
         self._fastest = shared.arm.transmission.largest_motor_velocities(shared.arm.joints.speed_limit)
         self.refusals: dict[str, str] = {}

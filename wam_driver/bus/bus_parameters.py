@@ -21,6 +21,6 @@ class BusParameters(DriverParameters):
 
     def require_fit(self, arm: Arm) -> None:
         """Refuse a home pose that has not one angle for each joint, or one beyond its stops."""
-        n = len(arm.joints.names)
+        n = arm.n
         require(len(self.home) == n, f"parameter 'home' has {len(self.home)} values; {n} joints need {n}")
         require(not (beyond := arm.joints.beyond(self.home)), f"parameter 'home': {beyond}")

@@ -65,9 +65,9 @@ def drawn(name: str, arm: Arm, random: np.random.Generator) -> Degradation:
 
     `as stated` draws friction within 10 % and masses within 2 %, which is what the configured estimator states.
     """
-    arms, motors = DrawnArm(random, arm), len(arm.motors.names)
+    arms, motors = DrawnArm(random, arm), arm.n
     stated = arms.level(0.9, 1.1) | arms.masses(0.02)
-    signs = random.choice((-1.0, 1.0), motors + len(arm.joints.names))
+    signs = random.choice((-1.0, 1.0), motors + arm.n)
     forty = {
         "driver:mismatch.motor_friction": (1.0 + 0.4 * signs[:motors]).tolist(),
         "driver:mismatch.joint_friction": (1.0 + 0.4 * signs[motors:]).tolist(),

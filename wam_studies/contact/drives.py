@@ -136,7 +136,7 @@ def record(drive: Drive) -> DriveRecording:
         rows.append([*state.position, *state.velocity, *state.effort, max(map(abs, run.driver.plant.qd))])
         _push(run, arm, contacts, k * period)
         done = run.step() or run.driver.safety.mode is Mode.FAULT
-    theta, thetad, torque, speed = np.split(np.array(rows), len(arm.motors.names) * np.arange(1, 4), axis=1)
+    theta, thetad, torque, speed = np.split(np.array(rows), arm.n * np.arange(1, 4), axis=1)
     failure = run.driver.safety.fault or run.scenario.failure
     model = _identified(configured, degradation, drive.seed) if drive.is_identified else {}
     return DriveRecording(degradation, theta, thetad, torque, speed[:, 0], tuple(contacts), failure, model)
@@ -194,7 +194,7 @@ def replay(drive: Drive, recording: DriveRecording) -> ContactScore:
         contacts,
         name=drive.degradation,
         group=IDENTIFIED_ARM if drive.is_identified else drive.contacts,
-        torques=torque_errors(moments, np.zeros((len(moments), len(shared.arm.joints.names))), settled),
+        torques=torque_errors(moments, np.zeros((len(moments), shared.arm.n)), settled),
         warnings=sum(warned) / max(1, len(warned)),
         contact_seconds=sum(one.end - one.begin for one in contacts if not one.mass),
         masses=tuple(_mass(one, moments) for one in contacts if one.mass),

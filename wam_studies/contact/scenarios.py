@@ -104,7 +104,7 @@ def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, 
         **{f"driver:world.obstacles.{field.name}": [] for field in fields(Obstacles)},
         "force_loop:joint_speed_limit": 3.5,
         "contact_estimator:use_joint_sensors": joint_sensors,
-        "contact_estimator:observer.mass_scale": [1.0] * len(configuration.shared.arm.joints.names),
+        "contact_estimator:observer.mass_scale": [1.0] * configuration.shared.arm.n,
         "contact_estimator:observer.friction_scale": 1.0,
     }
 

@@ -33,7 +33,7 @@ class OpenLoopArm:
     def __init__(self, quiet: bool, fed_forward: float = 0.0) -> None:
         configuration = Configuration.load(packaged("wam"))
         arm, driver = configuration.shared.arm, configuration.node("driver", DriverParameters)
-        continuous, none = np.array(arm.motors.continuous_torque), (0.0,) * len(arm.joints.names)
+        continuous, none = np.array(arm.motors.continuous_torque), (0.0,) * arm.n
         measured = np.array(arm.motors.static_friction)
         friction = CASE.friction_share * continuous if quiet else (1.0 - CASE.cogging) * measured
         level = tuple(friction.tolist())

@@ -30,7 +30,7 @@ class UsualController:
     def __init__(self, shared: Shared, own: ForceLoopParameters) -> None:
         self._body, self._own = RigidBody(shared.model_arm), own
         self._start: Array | None = None
-        self._zero, self._torques = np.zeros((2, len(shared.arm.joints.names)))
+        self._zero, self._torques = np.zeros((2, shared.arm.n))
 
     def tare(self) -> None:
         """Take the present torques as zero."""

@@ -158,7 +158,7 @@ class ElbowJoint(NamedTuple):
         """The elbow of an arm that has two covers or more."""
         arm = body.arm
         inner, outer = arm.covers.names[:2]
-        joint, zero = arm.links.names.index(arm.covers.links[1]), [0.0] * len(arm.joints.names)
+        joint, zero = arm.links.names.index(arm.covers.links[1]), [0.0] * arm.n
         pose = body.cover_pose(zero, outer)
         axis = pose.rotation @ body.cover_jacobian(zero, outer)[3:, joint]
         here, there = pose.rotation[:, 0], body.cover_pose(zero, inner).rotation[:, 0]
@@ -228,7 +228,7 @@ def _errors(arm: Arm, random: np.random.Generator) -> dict[str, Any]:
     """Centres of mass that are off, noise of the joint sensors, and mistakes of the user."""
     mistake = float(random.uniform(*RANGES.mistakes) * random.choice((-1.0, 1.0)))
     return {
-        "centres": tuple((RANGES.centres * random.normal(size=3 * len(arm.links.names))).tolist()),
+        "centres": tuple((RANGES.centres * random.normal(size=3 * arm.n)).tolist()),
         "strain_noise": float(random.uniform(*RANGES.strain_noises)),
         "misplaced": mistake if random.random() < RANGES.mistaken else 0.0,
     }

@@ -82,13 +82,13 @@ class DrawnArm(NamedTuple):
 
     def each_motor(self, low: float, high: float) -> list[float]:
         """A random number between two ends for each motor."""
-        return self.around(low, high, len(self.arm.motors.names))
+        return self.around(low, high, self.arm.n)
 
     def level(self, low: float, high: float) -> Values:
         """Levels of friction over those configured."""
         return {
             "driver:mismatch.motor_friction": self.each_motor(low, high),
-            "driver:mismatch.joint_friction": self.around(low, high, len(self.arm.joints.names)),
+            "driver:mismatch.joint_friction": self.around(low, high, self.arm.n),
         }
 
     def stribeck(self, excess: float) -> Values:
@@ -101,23 +101,23 @@ class DrawnArm(NamedTuple):
 
     def asymmetric(self, size: float) -> Values:
         """Friction that differs by direction."""
-        keys, shafts = ("motor_asymmetry", "joint_asymmetry"), len(self.arm.motors.names)
+        keys, shafts = ("motor_asymmetry", "joint_asymmetry"), self.arm.n
         return {f"driver:friction.{key}": (size * self.random.choice((-1.0, 1.0), shafts)).tolist() for key in keys}
 
     def encoder(self, counts: int) -> Values:
         """Encoders of so many counts per turn."""
-        return {"driver:sensors.encoder_resolution": [2.0 * math.pi / counts] * len(self.arm.motors.names)}
+        return {"driver:sensors.encoder_resolution": [2.0 * math.pi / counts] * self.arm.n}
 
     def cogging(self, amplitude: float) -> Values:
         """Cogging of this amplitude, N m, in any phase."""
         return {
-            "driver:effects.ripples.amplitude": [amplitude] * len(self.arm.motors.names),
+            "driver:effects.ripples.amplitude": [amplitude] * self.arm.n,
             "driver:effects.ripples.phase": self.each_motor(-math.pi, math.pi),
         }
 
     def masses(self, width: float) -> Values:
         """Masses within this share of those configured."""
-        return {"driver:mismatch.mass": self.around(1.0 - width, 1.0 + width, len(self.arm.links.names))}
+        return {"driver:mismatch.mass": self.around(1.0 - width, 1.0 + width, self.arm.n)}
 
     def centre(self, metres: float) -> Values:
         """Centres of mass of the model."""
@@ -130,7 +130,7 @@ class DrawnArm(NamedTuple):
 
     def noise(self, level: float) -> Values:
         """Ripple of the torque and noise of the current."""
-        each = [level] * len(self.arm.motors.names)
+        each = [level] * self.arm.n
         return {"driver:amplifier.torque_ripple": each, "driver:amplifier.current_noise": each}
 
 
@@ -188,7 +188,7 @@ class TrueFriction(NamedTuple):
 def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
     """A plant of a kind, drawn from a seed; the controllers' model stays as it is."""
     shared, random = configuration.shared, np.random.Generator(np.random.PCG64([seed, KINDS.index(kind)]))
-    arms, n = DrawnArm(random, shared.arm), len(shared.arm.motors.names)
+    arms, n = DrawnArm(random, shared.arm), shared.arm.n
     values = {"arm.joint_sensors": False, **arms.level(*RANGES.factor)}  # the sensors are not used here
     every = kind.startswith("all")
     if every or kind == "Stribeck":

@@ -69,8 +69,8 @@ def one_link(recording: Recording) -> OneLink:
         if the arm has more than one joint, or the loop has a G_P.
     """
     arm, control = recording.shared.arm, recording.parameters.part("force_loop", ForceLoopParameters)
-    if len(arm.joints.names) != 1:
-        raise ValueError(f"{arm.name} has {len(arm.joints.names)} joints; this evaluation is for one")
+    if arm.n != 1:
+        raise ValueError(f"{arm.name} has {arm.n} joints; this evaluation is for one")
     law = force_law(control)
     if law.proportional_gain[ACROSS]:
         raise ValueError(
