@@ -47,7 +47,6 @@ class Circuit(NamedTuple):
     radius: float  # torque at the motor per tension difference of a first-stage cable, m: its pinion's radius
     loss_per_torque: float  # fraction of the speed lost per torque at the motor, 1/(N m), (6.4) over all stages
     pretension: float  # N
-    breaking_strength: float  # N
     damping: float  # N m s/rad
 
     @property
@@ -93,6 +92,5 @@ def _circuit(cables: Cables, i: int, motor: str, reduction: float) -> Circuit:
         radius=cables.stage_radius[first] * cables.stage_circuits[first] / cables.stage_ratio[first],
         loss_per_torque=loss,
         pretension=cables.pretension[i],
-        breaking_strength=cables.breaking_strength[i],
         damping=cables.damping[i],
     )

@@ -65,7 +65,7 @@ class CableCircuits:
         self._slack_ends: Any = memoryview(data.plastic)
         # with backlash the ends are those of the play
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
-        self._damping = [circuit.damping for circuit in arm.circuits]
+        self._damping = arm.cables.damping
         creeps = effects.creep and not effects.terminated  # those of terminated cables are wound: `_creeps`
         self._losses = [step * circuit.loss_per_torque if creeps else 0.0 for circuit in arm.circuits]
         self.each: list[tuple[int, int, float, float]] = []

@@ -60,7 +60,7 @@ class LimitWatch:
         self._half = [0.5 * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
         starts = self._body.moving
         self._speeds = [*[cover_speed_limit] * len(starts), tip_speed_limit, *joints.speed_limit]
-        self._strengths = [circuit.breaking_strength for circuit in arm.circuits]
+        self._strengths = arm.cables.breaking_strength
         self._travels = {f"travel of {name} from the middle of its range": i for i, name in enumerate(joints.names)}
         self._of_cables = [(f"cable tension of {name}", "N") for name in motors.names]
         self._quantities = [

@@ -79,7 +79,7 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     cables = np.hstack([np.eye(n), -arm.transmission.motor_from_joint, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
     stiffness += np.diag(model.jnt_stiffness[model.dof_jntid])  # of doors
-    damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)
+    damping = cables.T @ np.diag(arm.cables.damping) @ cables + np.diag(model.dof_damping)
     for spring in world.springs.present:
         at = n + arm.joints.names.index(spring.joint)
         stiffness[at, at] += spring.stiffness * spring.lever * spring.lever

@@ -74,7 +74,7 @@ class SampledLoop:
         self.armature = np.diag(arm.joints.armature)
         self._n, self.tick, self.divisor = n, timing.period, timing.outer_divisor
         stiffness = np.array([circuit.stiffness for circuit in arm.circuits])
-        damping = np.array([circuit.damping for circuit in arm.circuits])
+        damping = np.array(arm.cables.damping)
         zero, one = np.zeros((n, n)), np.eye(n)
         # states: theta, thetad, q, qd
         cable = np.hstack(

@@ -144,7 +144,7 @@ class ServoGuard:
         loop = SampledLoop(arm, self._timing, Servo((0.0,) * n, (0.0,) * n))
         held = locked_rotors(
             arm.motors.inertia,
-            [circuit.damping for circuit in arm.circuits],
+            arm.cables.damping,
             [circuit.stiffness for circuit in arm.circuits],
             arm.motors.viscous_friction,
         )
