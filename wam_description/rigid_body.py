@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wam_description.arm import Arm
+from wam_description.parameters import rows
 from wam_description.thresholds import MODEL
 
 Array = NDArray[np.float64]
@@ -182,20 +183,18 @@ def point_mass(at: ArrayLike) -> Array:
     return np.concatenate(([1.0], place, (place @ place * np.eye(3) - np.outer(place, place))[INERTIA]))
 
 
-def joint_placement(arm: Arm, i: int) -> pin.SE3:
-    """Frame i of (A.4) at joint angle zero in the frame before it; i counts from 0, lengths in m."""
-    twist, length, offset = arm.joints.twist[i], arm.joints.length[i], arm.joints.offset[i]
-    rotation = pin.rpy.rpyToMatrix(twist, 0.0, 0.0)
-    return pin.SE3(rotation, rotation @ np.array([length, 0.0, offset]))
+def joint_placement(joint: Any) -> pin.SE3:
+    """Frame of a joint (A.4) at angle zero in the frame before it; the joint is one of the `rows`, lengths in m."""
+    rotation = pin.rpy.rpyToMatrix(joint.twist, 0.0, 0.0)
+    return pin.SE3(rotation, rotation @ np.array([joint.length, 0.0, joint.offset]))
 
 
-def cover_placement(arm: Arm, i: int) -> pin.SE3:
-    """Frame of cover i in its link's frame; i counts from 0, lengths in m.
+def cover_placement(cover: Any) -> pin.SE3:
+    """Frame of a cover in its link's frame; the cover is one of the `rows`, lengths in m.
 
     `rotation` is about fixed x, then y, then z, as in URDF.
     """
-    rows = slice(3 * i, 3 * i + 3)
-    return pin.SE3(pin.rpy.rpyToMatrix(*arm.covers.rotation[rows]), np.array(arm.covers.origin[rows]))
+    return pin.SE3(pin.rpy.rpyToMatrix(*cover.rotation), np.array(cover.origin))
 
 
 def _columns(jacobian: Array) -> Array:
@@ -215,17 +214,14 @@ def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:
     model = pin.Model()
     model.name = arm.name
     model.gravity.linear = np.array(arm.gravity)
-    links = arm.carried
-    centres = np.reshape(links.centre, (-1, 3))
-    joint = 0
-    for i, name in enumerate(arm.joints.names):
-        joint = model.addJoint(joint, pin.JointModelRZ(), joint_placement(arm, i), name)
-        mass = links.mass[i] * mass_scale[i]
-        inertia = pin.Inertia(mass, centres[i], links.tensor(i) * mass_scale[i])
-        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    _add_frame(model, "tool", joint, pin.SE3(np.eye(3), np.array(arm.tool)))
-    for i, name in enumerate(arm.covers.names):
-        _add_frame(model, name, 1 + arm.links.names.index(arm.covers.links[i]), cover_placement(arm, i))
+    at = 0
+    for i, (joint, link, scale) in enumerate(zip(rows(arm.joints), rows(arm.carried), mass_scale, strict=True)):
+        at = model.addJoint(at, pin.JointModelRZ(), joint_placement(joint), joint.name)
+        inertia = pin.Inertia(link.mass * scale, np.array(link.centre), arm.carried.tensor(i) * scale)
+        model.appendBodyToJoint(at, inertia, pin.SE3.Identity())
+    _add_frame(model, "tool", at, pin.SE3(np.eye(3), np.array(arm.tool)))
+    for cover in rows(arm.covers):
+        _add_frame(model, cover.name, 1 + arm.links.names.index(cover.link), cover_placement(cover))
     return model
 
 

@@ -10,7 +10,6 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
@@ -65,21 +64,22 @@ def _add_link(robot: Element, arm: Arm, i: int, link: Any) -> None:
     tensor = arm.carried.tensor(i)
     elements = ((a, b) for a in range(3) for b in range(a, 3))
     add(inertial, "inertia", **{f"i{'xyz'[a]}{'xyz'[b]}": tensor[a, b] for a, b in elements})
-    for k, cover in enumerate(rows(arm.covers)):
+    for cover in rows(arm.covers):
         if cover.link == link.name:
-            _add_tube(element, cover_placement(arm, k), cover)
+            _add_tube(element, cover)
 
 
 def _add_joint(robot: Element, arm: Arm, i: int, joint: Any, effort: float) -> None:
     parent = arm.links.names[i - 1] if i else BASE
     element = _add_connection(robot, joint.name, "revolute", parent, arm.links.names[i])
-    add(element, "origin", xyz=joint_placement(arm, i).translation, rpy=(joint.twist, 0.0, 0.0))
+    add(element, "origin", xyz=joint_placement(joint).translation, rpy=(joint.twist, 0.0, 0.0))
     add(element, "axis", xyz="0 0 1")
     add(element, "limit", lower=joint.lower, upper=joint.upper, effort=effort, velocity=joint.speed_limit)
 
 
-def _add_tube(link: Element, placement: pin.SE3, cover: Any) -> None:
+def _add_tube(link: Element, cover: Any) -> None:
     """Draw a cover on the link that carries it: geometry on a massless frame gets a mass in MuJoCo."""
+    placement = cover_placement(cover)
     start, end = (placement.act(np.array(one)) for one in (cover.start, cover.end))
     turn, radius = _along(end - start), cover.radius
     for tag in ("visual", "collision"):
