@@ -4,11 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wam_description.parameters import named, parameter, require
+from wam_description.parameters import named, parameter, require, rows
+from wam_description.small_matrices import Array
 from wam_description.thresholds import MODEL
 
 
@@ -115,11 +116,11 @@ class Links:
 
     def __post_init__(self) -> None:
         named("arm.links", self, least=1)
-        for i, name in enumerate(self.names):
-            least = float(np.linalg.eigvalsh(self.tensor(i))[0])
+        for link in rows(self):
+            least = float(np.linalg.eigvalsh(tensor(link))[0])
             require(
                 least >= 0.0,
-                f"{name}: arm.links.inertia and product give a principal inertia of {least:.3g} kg m^2, below 0",
+                f"{link.name}: arm.links.inertia and product give a principal inertia of {least:.3g} kg m^2, below 0",
             )
 
     def require_bodies(self) -> None:
@@ -130,16 +131,17 @@ class Links:
         ParameterError
             names the link and its inertias.
         """
-        for i, name in enumerate(self.names):
-            least, middle, largest = np.linalg.eigvalsh(self.tensor(i)).tolist()
+        for link in rows(self):
+            least, middle, largest = np.linalg.eigvalsh(tensor(link)).tolist()
             require(
                 largest <= (least + middle) * (1.0 + MODEL.rounded),
-                f"{name}: arm.links.inertia and product give the principal inertias {least:.4g}, {middle:.4g} and "
+                f"{link.name}: arm.links.inertia and product give the principal inertias {least:.4g}, {middle:.4g} and "
                 f"{largest:.4g} kg m^2; of no body is the largest one above the sum of the others, "
                 f"{least + middle:.4g} kg m^2",
             )
 
-    def tensor(self, i: int) -> NDArray[np.float64]:
-        """Inertia tensor of link i, counted from 0, about its centre of mass in its frame, (3, 3), kg m^2."""
-        (xx, yy, zz), (xy, xz, yz) = (values[3 * i : 3 * i + 3] for values in (self.inertia, self.product))
-        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+def tensor(link: Any) -> Array:
+    """Inertia tensor of one of the `rows` of the links, about its centre of mass in its frame, (3, 3), kg m^2."""
+    (xx, yy, zz), (xy, xz, yz) = link.inertia, link.product
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wam_description.arm import Arm
 from wam_description.parameters import rows
+from wam_description.parts import tensor
 from wam_description.thresholds import MODEL
 
 Array = NDArray[np.float64]
@@ -215,9 +216,9 @@ def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:
     model.name = arm.name
     model.gravity.linear = np.array(arm.gravity)
     at = 0
-    for i, (joint, link, scale) in enumerate(zip(rows(arm.joints), rows(arm.carried), mass_scale, strict=True)):
+    for joint, link, scale in zip(rows(arm.joints), rows(arm.carried), mass_scale, strict=True):
         at = model.addJoint(at, pin.JointModelRZ(), joint_placement(joint), joint.name)
-        inertia = pin.Inertia(link.mass * scale, np.array(link.centre), arm.carried.tensor(i) * scale)
+        inertia = pin.Inertia(link.mass * scale, np.array(link.centre), tensor(link) * scale)
         model.appendBodyToJoint(at, inertia, pin.SE3.Identity())
     _add_frame(model, "tool", at, pin.SE3(np.eye(3), np.array(arm.tool)))
     for cover in rows(arm.covers):

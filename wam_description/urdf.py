@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wam_description.arm import Arm
 from wam_description.parameters import rows
+from wam_description.parts import tensor
 from wam_description.rigid_body import cover_placement, joint_placement
 from wam_description.signals import ZERO
 from wam_description.xml_element import add, text, written
@@ -41,8 +42,8 @@ def urdf(arm: Arm, namespace: str = "") -> str:
     add(robot, "link", name=ROOT)
     add(robot, "link", name=BASE)
     _add_fixed(robot, ROOT, BASE)
-    for i, link in enumerate(rows(arm.carried)):
-        _add_link(robot, arm, i, link)
+    for link in rows(arm.carried):
+        _add_link(robot, arm, link)
     for cover in rows(arm.covers):
         add(robot, "link", name=cover.name)
         _add_fixed(robot, cover.link, cover.name, cover.origin, cover.rotation)
@@ -56,14 +57,14 @@ def urdf(arm: Arm, namespace: str = "") -> str:
     return f'<?xml version="1.0"?>\n{text(robot)}\n'
 
 
-def _add_link(robot: Element, arm: Arm, i: int, link: Any) -> None:
+def _add_link(robot: Element, arm: Arm, link: Any) -> None:
     element = add(robot, "link", name=link.name)
     inertial = add(element, "inertial")
     add(inertial, "origin", xyz=link.centre, rpy=ZERO)
     add(inertial, "mass", value=link.mass)
-    tensor = arm.carried.tensor(i)
+    inertia = tensor(link)
     elements = ((a, b) for a in range(3) for b in range(a, 3))
-    add(inertial, "inertia", **{f"i{'xyz'[a]}{'xyz'[b]}": tensor[a, b] for a, b in elements})
+    add(inertial, "inertia", **{f"i{'xyz'[a]}{'xyz'[b]}": inertia[a, b] for a, b in elements})
     for cover in rows(arm.covers):
         if cover.link == link.name:
             _add_tube(element, cover)

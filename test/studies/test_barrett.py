@@ -20,6 +20,8 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
+from wam_description.parameters import rows
+from wam_description.parts import tensor
 from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.limit_watch import LimitWatch
@@ -156,11 +158,10 @@ def test_no_motor_may_give_more_than_its_controller_and_the_safety_module_let_it
 
 
 def test_the_identified_model_keeps_the_products_of_inertia(arm: Arm) -> None:
-    for i, mass in enumerate(arm.links.mass):
-        centre = np.array(arm.links.centre[3 * i : 3 * i + 3])
-        link = np.array([mass, *(mass * centre), *arm.links.inertia[3 * i : 3 * i + 3]])
-        ten = about_origin(link, arm.links.product[3 * i : 3 * i + 3])
-        expected = pin.Inertia(mass, centre, arm.links.tensor(i)).toDynamicParameters()
+    for link in rows(arm.links):
+        centre = np.array(link.centre)
+        ten = about_origin(np.array([link.mass, *(link.mass * centre), *link.inertia]), link.product)
+        expected = pin.Inertia(link.mass, centre, tensor(link)).toDynamicParameters()
         np.testing.assert_allclose(ten, expected, rtol=0, atol=1e-12)
 
 
