@@ -46,7 +46,8 @@ class CableCircuits:
     is_bounded : True if cables end on their pulleys or slip as a whole.
     is_slack : True if a strand is slack and friction depends on the tension.
     each : of each circuit the two slack ends between its strands, creep in a step per speed and torque, and the
-        torque, N m, above which friction depends on the tension; it remains the same list, which the steps in C read.
+        torque, N m, above which friction depends on the tension; it remains the same list, which the steps in C read,
+        and is empty before `tighten`.
     """
 
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
@@ -69,18 +70,6 @@ class CableCircuits:
         creeps = effects.creep and not effects.terminated  # those of terminated cables are wound: `_creeps`
         self._losses = [step * circuit.loss_per_torque if creeps else 0.0 for circuit in arm.circuits]
         self.each: list[tuple[int, int, float, float]] = []
-        self._prepare()
-
-    def _prepare(self) -> None:
-        self.each[:] = [
-            (
-                4 * i + 1,
-                4 * i + 2,
-                loss,
-                2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf,
-            )
-            for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
-        ]
 
     def reset(self) -> None:
         """Return to power-up; the first step finds out whether a strand is slack."""
@@ -110,7 +99,15 @@ class CableCircuits:
             for circuit, share in zip(self._nominal, shares, strict=True)
         )
         self._move_ends(before, self._circuits)
-        self._prepare()
+        self.each[:] = [
+            (
+                4 * i + 1,
+                4 * i + 2,
+                loss,
+                2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf,
+            )
+            for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
+        ]
         self.is_slack = self._friction_counts
         return self._circuits
 
