@@ -113,11 +113,11 @@ class Doors(Solids, Countable):
 
     def __post_init__(self) -> None:
         self.check("world.doors")
-        for name, low, high in zip(self.names, self.lower, self.upper, strict=True):
+        for one in rows(self):
             require(
-                low <= 0.0 <= high and low < high,
-                f"{name}: world.doors.lower is {low:g} rad, upper {high:g} rad; 0, the angle at power-up, must be "
-                "between",
+                one.lower <= 0.0 <= one.upper and one.lower < one.upper,
+                f"{one.name}: world.doors.lower is {one.lower:g} rad, upper {one.upper:g} rad; 0, the angle at "
+                "power-up, must be between",
             )
 
 

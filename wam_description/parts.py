@@ -30,10 +30,11 @@ class Motors:
 
     def __post_init__(self) -> None:
         _check_shafts("arm.motors", self)
-        for name, peak, continuous in zip(self.names, self.peak_torque, self.continuous_torque, strict=True):
+        for one in rows(self):
             require(
-                continuous <= peak,
-                f"{name}: arm.motors.continuous_torque {continuous:g} N m is above peak_torque {peak:g} N m",
+                one.continuous_torque <= one.peak_torque,
+                f"{one.name}: arm.motors.continuous_torque {one.continuous_torque:g} N m is above peak_torque "
+                f"{one.peak_torque:g} N m",
             )
 
     @cached_property
@@ -63,9 +64,15 @@ class Joints:
 
     def __post_init__(self) -> None:
         _check_shafts("arm.joints", self)
-        for name, low, start, high in zip(self.names, self.lower, self.start, self.upper, strict=True):
-            require(low < high, f"{name}: arm.joints.lower {low:g} rad is not below upper {high:g} rad")
-            require(low <= start <= high, f"{name}: arm.joints.start {start:g} rad is outside {low:g} to {high:g} rad")
+        for one in rows(self):
+            require(
+                one.lower < one.upper,
+                f"{one.name}: arm.joints.lower {one.lower:g} rad is not below upper {one.upper:g} rad",
+            )
+            require(
+                one.lower <= one.start <= one.upper,
+                f"{one.name}: arm.joints.start {one.start:g} rad is outside {one.lower:g} to {one.upper:g} rad",
+            )
 
     @property
     def places(self) -> list[tuple[float, float, float]]:
@@ -84,10 +91,11 @@ class Joints:
 def _check_shafts(group: str, shafts: Motors | Joints) -> None:
     """Refuse a name twice, a list that has not one value each, and friction that grows with the motion."""
     named(group, shafts, least=1)
-    for name, f_static, f_dynamic in zip(shafts.names, shafts.static_friction, shafts.dynamic_friction, strict=True):
+    for one in rows(shafts):
         require(
-            f_dynamic <= f_static,
-            f"{name}: {group}.dynamic_friction {f_dynamic:g} N m is above static_friction {f_static:g} N m",
+            one.dynamic_friction <= one.static_friction,
+            f"{one.name}: {group}.dynamic_friction {one.dynamic_friction:g} N m is above static_friction "
+            f"{one.static_friction:g} N m",
         )
 
 
