@@ -284,11 +284,6 @@ class Timing:
         """Step of the plant in seconds."""
         return self.period / self.substeps
 
-    def outer_stamp(self, stamp: int) -> int:
-        """Stamp of the outer period that `stamp` falls into, ns; the first period, tick 1, is an outer one."""
-        period, divisor = self.period_ns, self.outer_divisor
-        return (1 + (stamp // period - 1) // divisor * divisor) * period
-
     def is_outer(self, stamp: int) -> bool:
         """Whether the joint side works on the state of this stamp, ns; the first period, tick 1, is an outer one."""
         return (stamp - self.period_ns) % self.outer_period_ns == 0

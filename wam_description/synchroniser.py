@@ -91,7 +91,7 @@ class Synchroniser:
         clock: "Synchroniser | None" = None,
     ) -> None:
         self._outer, self._thinned = outer, thinned
-        self._timing, self._trigger = timing, trigger
+        self._trigger = trigger
         self._period = timing.outer_period_ns if outer else timing.period_ns
         self._nominal = seconds(self._period)
         waits = timing.mode == "lockstep"
@@ -321,7 +321,7 @@ class Synchroniser:
         """Topics without which no step has been made for the state of this time, ns; none where it has been made."""
         if self._triggers and self._last <= now:
             return self.missing(self._triggers[0][0])
-        due = self._timing.outer_stamp(now) if self._outer else now
+        due = now - (now - self._outer_phase) % self._outer_period if self._outer else now
         return [] if due <= self._last <= now else [self._trigger]  # what came after `now` is of an earlier session
 
     def ages(self) -> dict[str, float]:
