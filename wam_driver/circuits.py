@@ -7,7 +7,7 @@ from typing import Any
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
-from wam_driver.thresholds import CIRCUITS
+from wam_driver.thresholds import PLANT
 
 
 class WoundCable:
@@ -23,14 +23,14 @@ class WoundCable:
     """
 
     def __init__(self, loss: float) -> None:
-        self._loss = 0.5 * loss * CIRCUITS.wound_part
+        self._loss = 0.5 * loss * PLANT.wound_part
         self._torque: dict[float, float] = {}
 
     def creep(self, angle: float, travel: float, torque: float) -> float:
         """Creep, rad, at a rotor angle, rad, over a travel, rad, 0 or more, under a torque, N m."""
-        part = angle / CIRCUITS.wound_part // 1.0  # not a number where the simulation diverges
+        part = angle / PLANT.wound_part // 1.0  # not a number where the simulation diverges
         before = self._torque.get(part, 0.0)
-        change = (torque - before) * -math.expm1(-CIRCUITS.passages * travel / CIRCUITS.wound_part)
+        change = (torque - before) * -math.expm1(-PLANT.passages * travel / PLANT.wound_part)
         self._torque[part] = before + change
         return self._loss * change
 

@@ -22,12 +22,7 @@ class PlantThresholds:
     # of the sharing between the ends of a tube: energy is conserved to 0.2 %, and depths within 2 % count as equal
     sharpness: int = 32
     smallest_depth: float = 1e-12  # m
-
-
-@dataclass(frozen=True, slots=True)
-class CircuitThresholds:
-    """Resolution of the load along a cable that ends on its pulleys."""
-
+    # of a cable that ends on its pulleys
     wound_part: float = 0.05  # rad of the rotor, wound under one load: half a millimetre of cable on the pinions
     passages: float = 4.0  # times a part takes over the load by a factor of e while it passes: 98 % of it
 
@@ -88,6 +83,5 @@ class BusThresholds:
 
 
 PLANT = PlantThresholds()
-CIRCUITS = CircuitThresholds()
 DRIVER = DriverThresholds()
 BUS = BusThresholds()
