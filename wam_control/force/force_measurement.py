@@ -65,7 +65,7 @@ class ForceMeasurement:
     def __init__(self, body: RigidBody) -> None:
         self._body = body
         self.free = self._torque_sd = none = self._none
-        self._tare = self._zero = self._before = Zero(0.0, none)
+        self._tare = self._zero = Zero(0.0, none)
         self._q: Sequence[float] = ()
         self._velocity = list[float]()
         self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
@@ -74,8 +74,9 @@ class ForceMeasurement:
         self.restart()
 
     def restart(self, torques: Sequence[float] = ()) -> None:
-        """Forget the filtered torques, or go on from others (n,), N m."""
+        """Forget the filtered torques and the load, or go on from other torques (n,), N m."""
         self._filter = LowPass(torques)
+        self._before = self._taken(np.array(self._steady.value)) if len(torques) else Zero(0.0, self._none)
         self.torques = self.torques._replace(now=self._none, before=self._none, acceleration=None)
 
     def step(self, own: ForceLoopParameters, given: ForceInput, is_pressing: bool) -> None:
