@@ -184,5 +184,5 @@ def _sets(stamps: Times, received: Times) -> Index:
     before, after = windows[rows - edge], windows[rows + 1]
     apart = np.maximum(after.min(axis=1) - before.max(axis=1), before.min(axis=1) - after.max(axis=1))
     both = np.stack([steps, np.diff(received)])
-    pace = np.median(sliding_window_view(both, edge, axis=1)[:, [rows - edge, rows + 1]], axis=-1)
+    pace = np.mean(sliding_window_view(both, edge, axis=1)[:, [rows - edge, rows + 1]], axis=-1)
     return rows[(2 * apart > np.abs(steps[rows])) & np.all(2 * pace.min(axis=0) > pace.max(axis=0), axis=0)]
