@@ -400,7 +400,7 @@ def still() -> list[Case]:
     pressed = wrenches("/f", times[1000:4000], np.ones((3000, 3)))
     return [
         Case("a hum", by_rosbags, joints("/s", times, ["a"], position=0.0 * hum, effort=hum),
-             {"a effort, 19 Hz: amplitude": 0.8}, "", NOTHING, ("a effort, 19 Hz: vibrates at rest",)),
+             {"a effort, 19 Hz: amplitude": 0.8}),
         *(Case(f"not in the {part}", sqlite, joints("/s", times, ["a"], position=0.0 * hum) + pressed, {},
                f"/f: no message in the {part} {seconds} s of the") for part, seconds in (("first", 5), ("last", 10))),
         Case("a cycle of four counts", by_rosbags, in_steps(0.3, math.pi / 1024.0, math.pi / 2048.0),

@@ -82,7 +82,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
 
 def spectrum_section(recording: AnalysedRecording) -> Section:
     """The strongest lines of each joint, or of its effort at rest, and of each wrench axis, in its longest stretch."""
-    findings, begins, looked, shows = list[Finding](), list[float](), set[str](), list[str]()
+    findings, begins, looked = list[Finding](), list[float](), set[str]()
     efforts = (
         (one, "effort", f"{one.label} effort") for one in recording.states if "effort" in one.values and rests(one)
     )
@@ -98,14 +98,12 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
                 name = f"{label}, {shown(line.frequency, 'Hz')}"
                 findings.append(Finding(f"{name}: amplitude", unit, line.amplitude))
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
-                if quantity == "effort" and rests(one):
-                    shows.append(f"{name}: vibrates at rest, with an amplitude of {shown(line.amplitude, unit)}.")
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
     least = shown(min(begins), "Hz")
     span = f"To find vibrations below {least}, record longer without a gap."
     silent = f"No clear vibration was found above {least} that lasts throughout, in {' or '.join(sorted(looked))}."
-    return Section("frequency", "Spectrum", (span if findings else silent,), findings, shows)
+    return Section("frequency", "Spectrum", (span if findings else silent,), findings)
 
 
 def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:
