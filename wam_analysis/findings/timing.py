@@ -70,9 +70,9 @@ def timing_section(recording: AnalysedRecording) -> Section:
         steps = np.diff(times).astype(np.float64)
         periods = usual_steps(steps) if len(steps) else np.full(1, math.nan)
         period, slowest = median(steps) / 1e9, float(np.max(periods)) / 1e9
-        lost, backwards = missed(times, periods), np.sum(np.diff(stamp) <= 0)
-        longest = int(np.argmax(np.diff(stamp)))
-        gap, begin = float(np.diff(stamp)[longest]) / 1e9, (stamp[longest] - first) / 1e9
+        lost, waits = missed(times, periods), np.diff(stamp)
+        longest, backwards = int(np.argmax(waits)), np.sum(waits <= 0)
+        gap, begin = float(waits[longest]) / 1e9, (stamp[longest] - first) / 1e9
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * period, 1e3 * expected),
             Finding(f"{name}: missed periods", "", lost),
@@ -80,12 +80,12 @@ def timing_section(recording: AnalysedRecording) -> Section:
         ]
         findings += [Finding(f"{name}: stamps that do not increase", "", float(backwards))] * bool(backwards)
         if received is not None and np.ptp(received) > STREAM.live * np.ptp(stamp):  # of no file that was converted
-            waits = np.diff(np.sort(received)) / 1e9
+            receptions = np.diff(np.sort(received)) / 1e9
             usual = np.diff(received[rows])[steps <= STREAM.changes * periods] / 1e9  # with no message missing
             findings += [
-                Finding(f"{name}: period of the receptions", "ms", 1e3 * float(np.mean(waits))),
+                Finding(f"{name}: period of the receptions", "ms", 1e3 * float(np.mean(receptions))),
                 Finding(f"{name}: reception jitter", "ms", 1e3 * float(np.std(usual)), note="standard deviation"),
-                Finding(f"{name}: longest gap between receptions", "s", float(np.max(waits))),
+                Finding(f"{name}: longest gap between receptions", "s", float(np.max(receptions))),
             ]
             late = float(np.median(received - stamp))
             if abs(late) < STREAM.reset:  # else they are of two clocks
