@@ -109,9 +109,9 @@ class ForceMeasurement:
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
         if self.rested > FORCE.friction_turn and not is_pressing:
             steady = np.array(self._steady.value)
-            seen = self._taken(steady)
-            if np.all(np.abs(torque - steady) < FORCE.certain * self._torque_sd) and (seen.mass or not is_touched):
-                self._before = seen
+            if np.all(np.abs(torque - steady) < FORCE.certain * self._torque_sd):
+                seen = self._taken(steady)
+                self._before = seen if seen.mass or not is_touched else self._before
 
     @property
     def _none(self) -> Array:
