@@ -37,8 +37,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force of the arm on the world, N. `frame` is "
-    "`base` or a cover. Optional: `contact_position`, m along the cover, if `frame` is the cover and the force is "
-    "nearly at right angles to it; `rise`, rise time of the force, s",
+    "`base` or a cover. `rise` is the rise time, s. `contact_position`, m along the cover, needs the cover as `frame`, "
+    "and a force nearly at right angles to it",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "torque of each joint on the world, N m; the scenario sends it as a `task`",
     "until_force": "force, N. The step ends when a contact with this force is detected, and fails if there is none. "
