@@ -98,8 +98,7 @@ class ContactFusion:
 
     def reset(self) -> None:
         """The contact has ended, or is another one."""
-        self._last: _Seen | None = None  # its errors are still those of the present one
-        self._instants: deque[_Seen] = deque()
+        self._instants: deque[_Seen] = deque()  # the errors of the last one are still those of the present
         self._past: _Past | None = None
         self._widening = 1.0
         self._speed = _speed(CONTACT.slide_probability)

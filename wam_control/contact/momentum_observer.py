@@ -102,7 +102,8 @@ class MomentumObserver:
         self._last = _Sample([0.0] * n, [0.0] * n, [], np.zeros((n, n)), [], [], None)
         self._side.reset()
         self._errors.reset()
-        self._gap = self.age = self._followed = 0.0
+        self.age = self._followed = 0.0
+        self._span = 0.0  # s, since the last sample that was taken
 
     @property
     def is_ready(self) -> bool:
@@ -137,27 +138,27 @@ class MomentumObserver:
         n = self._n
         if not (0.0 < dt < math.inf):
             return False
+        self._span += dt
         position, velocity, effort = state
         # of joint sensors, what follows from the sample is finite only if the sample is
         finite = self._is_link_side or math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
         if not len(position) == len(velocity) == len(effort) == n or not finite:
-            self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(position, velocity, effort, [], NO_SIGNALS, dt)
+            return self._update(position, velocity, effort, [], NO_SIGNALS, self._span)
         if self._side.carries_nothing(state):
             self.reset()
             return True
-        sample = self._side.take(state, dt + self._gap)
-        self._gap = 0.0
+        sample = self._side.take(state, self._span)
+        self._span = 0.0
         return sample is None or self._update(*sample)
 
     def _update(
-        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, dt: float
+        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: Array, span: float
     ) -> bool:
         """Take a sample of the joints, see `JointSample`."""
         body, at, speed, last = self.body, np.array(q), np.array(qd), self._last
-        span, inertia, links = dt + self._gap, body.mass_matrix(at), None
+        inertia, links = body.mass_matrix(at), None
         if self._is_link_side:
             momentum = inertia.dot(speed).tolist()
         else:
@@ -177,10 +178,10 @@ class MomentumObserver:
                 external = [each + 0.5 * twice for each, twice in zip(external, resisted)]  # noqa: B905
         present = [*external, *model, *q, *qd, *(change / span for change in map(sub, qd, before))]
         if not math.isfinite(sum(momentum, sum(present))):
-            self._gap += dt
+            self._span = span
             return False
         self._filters.take(present, signals, span)
-        self._last, self._gap = _Sample(q, qd, momentum, inertia, bias, friction, links), 0.0
+        self._last, self._span = _Sample(q, qd, momentum, inertia, bias, friction, links), 0.0
         self.age += span
         return True
 
@@ -275,8 +276,8 @@ class _Sample(NamedTuple):
 class _Filters:
     """First-order filters of what a sample shows, and its mean over a cycle of a dither.
 
-    Each number is filtered with every time constant, in the order of `FilteredMotion`: torques and motion in lists,
-    the signals of the shafts, which are many, in arrays.
+    Each number is filtered with every time constant: torques and motion in the order of `FilteredMotion`, then the
+    signals of the shafts.
 
     Parameters
     ----------
@@ -293,32 +294,28 @@ class _Filters:
     def __init__(self, n: int, signals: int, times: Sequence[float], cycle: int) -> None:
         self.times, self.cycle, self._n = times, cycle, n
         self._ring = np.zeros((cycle, 5 * n + signals))
-        self._empty = [[0.0] * (5 * n) for _ in times], [np.zeros(signals) for _ in times]
+        self._empty = [np.zeros(5 * n + signals)] * len(times)
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
-        (self._values, self._signals), self.count = self._empty, 0
+        self._filtered, self.count = self._empty, 0
 
     def take(self, present: list[float], signals: Array, span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
+        now, before = np.concatenate((present, signals)), self._filtered
         keeps = [math.exp(-span / time) if self.count else 0.0 for time in self.times]
-        if not self.count or span <= self.times[0]:
-            # in lists: they take half the time of arrays
-            self._values = [
-                [keep * before + (1.0 - keep) * now for before, now in zip(old, present)]  # noqa: B905
-                for old, keep in zip(self._values, keeps, strict=True)
-            ]
-        if len(signals):
-            each = zip(self._signals, keeps, strict=True)
-            self._signals = [keep * old + (1.0 - keep) * signals for old, keep in each]
+        self._filtered = [keep * old + (1.0 - keep) * now for old, keep in zip(before, keeps, strict=True)]
+        if self.count and span > self.times[0]:
+            for filtered, old in zip(self._filtered, before, strict=True):
+                filtered[: len(present)] = old[: len(present)]
         if self.cycle:
-            self._ring[self.count % self.cycle] = np.concatenate((self._values[0], self._signals[0]))
+            self._ring[self.count % self.cycle] = self._filtered[0]
         self.count += 1
 
     def motion(self, which: int) -> FilteredMotion:
         """What was filtered with one time constant; the torque of the model without the mean over a cycle."""
-        n, filtered = self._n, np.concatenate((self._values[which], self._signals[which]))
+        n, filtered = self._n, self._filtered[which]
         mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
         pose, velocity, acceleration = mean[2 * n : 3 * n], mean[3 * n : 4 * n], mean[4 * n : 5 * n]
         return FilteredMotion(mean[:n], filtered[n : 2 * n], pose, velocity, acceleration, mean[5 * n :])
