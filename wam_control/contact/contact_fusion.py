@@ -98,7 +98,8 @@ class ContactFusion:
 
     def reset(self) -> None:
         """The contact has ended, or is another one."""
-        self._instants: deque[_Seen] = deque()  # the errors of the last one are still those of the present
+        # past ones, and the last one, whose errors are still those of the present
+        self._instants: deque[_Seen] = deque(maxlen=CONTACT.instants + 1)
         self._past: _Past | None = None
         self._widening = 1.0
         self._speed = _speed(CONTACT.slide_probability)
@@ -152,19 +153,20 @@ class ContactFusion:
             self._widening = (CONTACT.freedom + self._widening * residual) / (CONTACT.freedom + freedom)
             if self._widening > CONTACT.different:
                 self.reset()
-        instants, last = self._instants, self._last
-        is_early = last is not None and now.time - last.torques.time < CONTACT.instant_interval - MOTION.rounding
+        instants = self._instants
+        last = instants[-1].torques if instants else None
+        is_early = last is not None and now.time - last.time < CONTACT.instant_interval - MOTION.rounding
         if is_early or now.own.diagonal().min() < CONTACT.finest_sd**2:
             return
-        has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > CONTACT.pose_change
+        has_moved = last is None or np.abs(now.pose - last.pose).max() > CONTACT.pose_change
         if has_moved:
-            instants.extend([] if last is None else [last])
-            self._last = _Seen(now, rows)
+            instants.append(_Seen(now, rows))
         count = len(instants)
-        while instants and (len(instants) > CONTACT.instants or now.time - instants[0].torques.time > self._duration):
+        while len(instants) > 1 and now.time - instants[0].torques.time > self._duration:
             instants.popleft()
         if has_moved or len(instants) < count:
-            self._past = self._of(list(instants), now, np.array(guess)) if instants else None
+            *past, _ = instants
+            self._past = self._of(past, now, np.array(guess)) if past else None
 
     def _of(self, instants: list[_Seen], now: Torques, guess: Array) -> _Past:
         n, past, last = len(now.residual), [instant.torques for instant in instants], instants[-1].torques
