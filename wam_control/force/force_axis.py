@@ -8,7 +8,7 @@ known size, f is sensed by generalised least squares, without shrinkage (s.l = 1
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -69,11 +69,6 @@ class SensingParameters:
         high=1e6,
         live=True,
     )
-
-    @property
-    def of_estimate(self) -> "SensingParameters":
-        """Those of torques that are estimated from the motors."""
-        return replace(self, torque_sd=self.estimated_torque_sd, torque_fraction=self.estimated_torque_fraction)
 
 
 class ForceAxis(NamedTuple):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from wam_control.force.thresholds import FORCE
-from wam_description.parameters import require
+from wam_description.parameters import each, require
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ForceLaw:
                 f"parameter '{self.group}_{field}' has {len(values)} values; give {len(names)}, one for each of "
                 f"{', '.join(names)}, or one for all",
             )
-            object.__setattr__(self, field, values * len(names) if len(values) == 1 else values)
+            object.__setattr__(self, field, each(values, len(names)))
         for name, limit, deadband in zip(self.names, self.error_limit, self.deadband, strict=True):
             require(
                 limit > deadband,

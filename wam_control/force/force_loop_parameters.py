@@ -1,7 +1,7 @@
 """Parameters of the force loop, and the laws built from them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from wam_control.force.force_axis import SensingParameters
@@ -184,7 +184,10 @@ class ForceLoopParameters:
     @cached_property
     def sensing_fed_back(self) -> SensingParameters:
         """How the force is sensed with this feedback."""
-        return self.sensing.of_estimate if self.is_estimated else self.sensing
+        given = self.sensing
+        if not self.is_estimated:
+            return given
+        return replace(given, torque_sd=given.estimated_torque_sd, torque_fraction=given.estimated_torque_fraction)
 
     @cached_property
     def latency(self) -> float:

@@ -14,6 +14,7 @@ from wam_control.task.scenario_values import is_one_of, number, numbers
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.signals import BASE, ZERO, Table, Triple
+from wam_description.small_matrices import cross
 from wam_description.topics import TASK_COLUMNS
 
 
@@ -112,10 +113,9 @@ def line_axes(arm: Arm, cover: str, point: Triple, along: Triple) -> tuple[TaskA
 
 def across(along: Triple) -> tuple[Triple, Triple]:
     """Two unit vectors across a direction (3,) and each other; the first one is level."""
-    x, y, z = unit(along)
+    axis = x, y, _ = unit(along)
     level = unit((-y, x, 0.0)) if math.hypot(x, y) > 1e-6 else (0.0, 1.0, 0.0)
-    a, b, c = level
-    return level, unit((y * c - z * b, z * a - x * c, x * b - y * a))
+    return level, unit(cross(axis, level))
 
 
 def table_of(task: TaskCommand | None, covers: Sequence[str]) -> Table:
