@@ -15,7 +15,7 @@ from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
 from wam_description.parameters import aligned, lengths, named, parameter, require, rows
 from wam_description.parts import Joints, Links, Motors
-from wam_description.small_matrices import rotation_xyz
+from wam_description.small_matrices import Array, rotation_xyz
 from wam_description.thresholds import FILES, MODEL
 from wam_description.transmission_map import TransmissionMap
 from wam_description.units import STANDARD_GRAVITY
@@ -212,6 +212,21 @@ class Arm:
     def circuits(self) -> tuple[Circuit, ...]:
         """The cable circuit of each motor, its stages in series."""
         return circuits(self.motors.names, self.transmission.motor_from_joint, self.cables)
+
+    @cached_property
+    def rotors(self) -> Array:
+        """Inertia of the rotors as the joints have it, (n, n), kg m^2."""
+        return self.transmission.at_joints(self.motors.inertia)
+
+    @cached_property
+    def pulleys(self) -> Array:
+        """Inertia of the pulleys that turn with the joints, (n, n), kg m^2."""
+        return np.diag(self.joints.armature)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Stiffness of the cables as the joints have it, (n, n), N m/rad."""
+        return self.transmission.at_joints([circuit.stiffness for circuit in self.circuits])
 
     @property
     def n(self) -> int:

@@ -57,7 +57,7 @@ def measures(configuration: Configuration) -> Measures:
     driver = configuration.node("driver", DriverParameters)
     body, tip, gears = RigidBody(arm), Backdriving(arm), arm.transmission.motor_from_joint
     pose = printed("pose in the middle of the workspace")
-    links = body.mass_matrix(pose) + np.diag(arm.joints.armature)
+    links = body.mass_matrix(pose) + arm.pulleys
     directions = normal_directions(body, pose)
     levers = directions @ body.tool_jacobian(pose)  # (directions, joints), m
     stiffness = max(driver.world.obstacles.stiffness)

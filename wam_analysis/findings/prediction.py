@@ -86,9 +86,9 @@ def node_at(recorded: PredictionParameters, press: PressedPoint) -> Node | None:
     if square <= 1e-6:
         return None
     at_joints = arm.transmission.at_joints
-    stiffness, cables = (at_joints([getattr(one, name) for one in arm.circuits]) for name in ("stiffness", "damping"))
-    inertia = body.mass_matrix(q) + np.diag(arm.joints.armature)
-    gives, servo = float(along @ np.linalg.solve(stiffness, along)), recorded.servo
+    cables = at_joints(arm.cables.damping)
+    inertia = body.mass_matrix(q) + arm.pulleys
+    gives, servo = float(along @ np.linalg.solve(arm.stiffness, along)), recorded.servo
     yields = servo is not None and all(gain > 0.0 for gain in servo.integral_gain)
     driven = float(along @ np.linalg.solve(at_joints(servo.integral_gain), along)) if servo and yields else 0.0
     moves = along / square

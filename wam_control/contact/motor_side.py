@@ -70,8 +70,7 @@ class MotorSide:
     def __init__(self, arm: Arm, parameters: ObserverParameters, has_dither: bool, model: ArmModel | None) -> None:
         self.map = arm.transmission
         self._squared = np.square(self.map.joint_from_motor)
-        self.rotors, self.pulleys = self.map.at_joints(arm.motors.inertia), np.diag(arm.joints.armature)
-        self._stiffness = self.map.at_joints([circuit.stiffness for circuit in arm.circuits])
+        self.rotors, self.pulleys, self._stiffness = arm.rotors, arm.pulleys, arm.stiffness
         self.is_identified = model is not None and model.is_identified
         self.friction = ShaftFriction(arm, parameters, model)
         self.velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)

@@ -157,14 +157,13 @@ class ForceAxes:
         self.torque_sd = np.full(arm.n, parameters.torque_sd)
         self._body, self.covers, self._parameters = body, arm.covers, parameters
         self._map = arm.transmission
-        self._armature = np.diag(arm.joints.armature)
-        self._rotors = self._map.at_joints(arm.motors.inertia)
+        self._rotors = arm.rotors
         self._friction = np.array(arm.joints.dynamic_friction)
-        self._compliance = np.linalg.inv(self._map.at_joints([circuit.stiffness for circuit in arm.circuits]))
+        self._compliance = np.linalg.inv(arm.stiffness)
 
     def inertia(self, q: Angles) -> Array:
-        """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
-        return self._body.mass_matrix(q) + self._armature
+        """Inertia at the joints with their pulleys (n, n), kg m^2, without rotors."""
+        return self._body.mass_matrix(q) + self._body.arm.pulleys
 
     def moved_inertia(self, q: Angles) -> Array:
         """The same with rotors: what hits a surface."""

@@ -69,9 +69,8 @@ class SampledLoop:
     def __init__(self, arm: Arm, timing: Timing, servo: Servo) -> None:
         n = arm.n
         self.body = RigidBody(arm)
-        self.joint_from_motor = np.reshape(arm.joint_from_motor, (n, n))
-        self.motor_from_joint = np.linalg.inv(self.joint_from_motor)
-        self.armature = np.diag(arm.joints.armature)
+        self.joint_from_motor = arm.transmission.joint_from_motor
+        self.motor_from_joint = arm.transmission.motor_from_joint
         self._n, self.tick, self.divisor = n, timing.period, timing.outer_divisor
         stiffness = np.array([circuit.stiffness for circuit in arm.circuits])
         damping = np.array(arm.cables.damping)
@@ -173,7 +172,7 @@ class SampledLoop:
         n = self._n
         links = self.body.mass_matrix(q)
         pressed = np.hstack([np.zeros((n, 2 * n)), contact, np.zeros((n, n))])
-        qdd = np.linalg.solve(links + self.armature, self._joint - pressed)
+        qdd = np.linalg.solve(links + self.body.arm.pulleys, self._joint - pressed)
         shown = pressed
         if feedback.kind == "joint_sensors":
             shown = links @ qdd + pressed

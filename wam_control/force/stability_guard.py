@@ -297,10 +297,9 @@ class StabilityGuard:
 
         With the friction of the joints alone: the velocity loop encloses that of the rotors.
         """
-        joints, loop = self.arm.joints, self._loop
-        reach = self.axis(contact).lever
+        joints, axis = self.arm.joints, self.axis(contact)
+        reach = axis.lever
         square = float(reach @ reach)
-        inertia = loop.body.mass_matrix(contact.q) + loop.armature
 
         def along(matrix: Array) -> float:
             return 1.0 / float(reach @ np.linalg.solve(matrix, reach))
@@ -308,11 +307,11 @@ class StabilityGuard:
         def friction(values: Sequence[float]) -> float:
             return float(np.abs(reach) @ np.array(values)) / square
 
-        damping, cables = np.array(joints.viscous_friction), [circuit.stiffness for circuit in self.arm.circuits]
+        damping = np.array(joints.viscous_friction)
         return FrictionNode(
-            inertia=along(inertia),
+            inertia=along(self._force_axes.inertia(contact.q)),
             damping=along(np.diag(damping)) if damping.all() else 0.0,
-            transmission_stiffness=along(self.arm.transmission.at_joints(cables)),
+            transmission_stiffness=1.0 / axis.compliance,
             contact_stiffness=self.parameters.contact_stiffness,
             dynamic_friction=friction(joints.dynamic_friction),
             static_friction=friction(joints.static_friction),

@@ -89,15 +89,15 @@ class Dither:
         x = J M^-1 tau/omega^2 with the rotors and pulleys in M, the largest over a cycle; heat
         (tau_rms/tau_continuous)^2.
         """
-        arm, transmission = self._arm, self._arm.transmission
+        arm = self._arm
         heat = tuple(
             0.5 * (a / most) ** 2 for a, most in zip(self.amplitude, arm.motors.continuous_torque, strict=True)
         )
         if not self._torque:
             return DitherCost(0.0, heat)
         body = RigidBody(arm)
-        inertia = body.mass_matrix(q) + transmission.at_joints(arm.motors.inertia) + np.diag(arm.joints.armature)
-        efforts = np.array([transmission.joint_torques(torque) for torque in self._torque])
+        inertia = body.mass_matrix(q) + arm.rotors + arm.pulleys
+        efforts = np.array([arm.transmission.joint_torques(torque) for torque in self._torque])
         moved = body.tool_jacobian(q) @ np.linalg.solve(inertia, efforts.T) / self._angular_frequency**2
         return DitherCost(2.0 * float(np.linalg.norm(moved, axis=0).max()), heat)
 

@@ -42,9 +42,8 @@ class Backdriving:
 
     def __init__(self, arm: Arm) -> None:
         self._body, gears = RigidBody(arm), arm.transmission.motor_from_joint
-        self.rotors = arm.transmission.at_joints(arm.motors.inertia)
+        self.rotors = arm.rotors
         self.friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
-        self._armature = np.diag(arm.joints.armature)
         directions = np.random.default_rng(CASE.backdriven_seed).normal(size=(CASE.backdriven_directions, 3))
         self._directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
@@ -58,7 +57,7 @@ class Backdriving:
         rotors : whether the motors' rotors are moved, too.
         """
         jacobian = self._body.tool_jacobian(q)
-        inertia = self._body.mass_matrix(q) + self._armature + (self.rotors if rotors else 0.0)
+        inertia = self._body.mass_matrix(q) + self._body.arm.pulleys + (self.rotors if rotors else 0.0)
         free = jacobian @ np.linalg.solve(inertia, jacobian.T)
         return np.asarray(np.linalg.solve(np.eye(3) + payload * free, free), dtype=np.float64)
 

@@ -204,5 +204,4 @@ def knowable(base: Configuration, task: Task) -> float:
 
 def inertia(arm: Arm, body: RigidBody, q: list[float]) -> Array:
     """Inertia at the joints, (n, n), kg m^2: links, pulleys, and rotors as if the cables were stiff."""
-    rotors = arm.transmission.at_joints(arm.motors.inertia)
-    return body.mass_matrix(q) + np.diag(arm.joints.armature) + rotors
+    return body.mass_matrix(q) + arm.pulleys + arm.rotors
