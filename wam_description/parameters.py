@@ -196,16 +196,9 @@ def listed(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def values(instance: Any, prefix: str = "") -> dict[str, Value]:
+def values(instance: Any) -> dict[str, Value]:
     """The flat ``{dotted name: value}`` of a parameter object; the inverse of `build`."""
-    flat: dict[str, Value] = {}
-    for item in dataclasses.fields(instance):
-        value = getattr(instance, item.name)
-        if dataclasses.is_dataclass(value):
-            flat.update(values(value, f"{prefix}{item.name}."))
-        else:
-            flat[prefix + item.name] = value
-    return flat
+    return dict(dotted(dataclasses.asdict(instance)))
 
 
 def build(cls: type[T], flat: Mapping[str, Any]) -> T:

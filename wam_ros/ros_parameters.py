@@ -10,7 +10,7 @@ from rclpy.parameter import Parameter
 from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED
-from wam_description.parameters import Field, ParameterError, build, checked, fields, listed, meant, values
+from wam_description.parameters import Field, ParameterError, build, build_part, checked, fields, listed, meant, values
 from wam_description.wiring import raised
 
 T = TypeVar("T")
@@ -34,7 +34,7 @@ def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
     shared_names = {field.name for field in fields(Shared)}
     name, where = node.get_name(), f"section '{SHARED}'"
     try:
-        shared = build(Shared, {key: value for key, value in given.items() if key in shared_names})
+        shared = build_part(Shared, given)
         where = f"section '/**/{name}' (in a test: arm.start({name}={{...}}))"
         own = build(cls, {key: value for key, value in given.items() if key not in shared_names})
     except ParameterError as error:

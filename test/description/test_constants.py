@@ -16,8 +16,8 @@ CARRIED = [(name, row) for name, table in TABLES.items() for row in table if row
 
 def arm_numbers(configuration: str = "wam") -> dict[str, tuple[float, ...]]:
     """Every number below `arm` in a configuration, arrays as tuples."""
-    flat = values(Configuration.load(packaged(configuration)).shared.arm, "arm.")
-    arrays = {name: value if isinstance(value, tuple) else (value,) for name, value in flat.items()}
+    flat = values(Configuration.load(packaged(configuration)).shared.arm)
+    arrays = {f"arm.{name}": value if isinstance(value, tuple) else (value,) for name, value in flat.items()}
     return {name: array for name, array in arrays.items() if not any(isinstance(x, str | bool) for x in array)}
 
 
