@@ -76,12 +76,11 @@ def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[
     contact : force of the world on a cover, N, and its position, m.
     """
     covers = arm.covers
-    i = covers.names.index(contact.cover)
-    begin, end = (np.array(point[3 * i : 3 * i + 3]) for point in (covers.start, covers.end))
-    along = (contact.position - begin[0]) / (end[0] - begin[0]) if end[0] != begin[0] else 0.0
     across = np.array([0.0, contact.force[1], contact.force[2]])
     size = float(np.linalg.norm(across))
-    point = begin + along * (end - begin) - (covers.radius[i] * across / size if size > 0.0 else 0.0)
+    point = np.array(covers.on_axis(contact.cover, contact.position))
+    if size > 0.0:
+        point -= covers.radius_of(contact.cover) * across / size
     body = RigidBody(arm)
     return body.point(q, contact.cover, point), body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)
 

@@ -69,8 +69,8 @@ NO_HYPOTHESIS = Hypothesis(
 
 class _Cover(NamedTuple):
     name: str
-    start: list[float]  # (3,), m, ends of the tube's axis in the cover's frame
-    end: list[float]
+    start: float  # m along x, ends of the tube
+    end: float
     wrenches: Array  # (6, 6), rows A_1, A_2, B_1, B_2, twist, axial: force and moment in the cover's frame
     ways: list[list[float]]  # (3, 3), directions across the tube, near the cover's y and z, and along it
     is_moment_only: bool
@@ -95,8 +95,8 @@ class ContactInference:
         self._body, self._parameters = body, parameters
         self._covers = covers = [_cover(arm, body, cover) for cover in rows(arm.covers)]
         parameters.require_fit(arm)
-        start, end = ([at[0] for at in ends] for ends in zip(*((c.start, c.end) for c in covers), strict=True))
-        self._fit = ContactFit(start, end, arm.covers.radius, parameters)
+        ends = [cover.start for cover in covers], [cover.end for cover in covers]
+        self._fit = ContactFit(*ends, arm.covers.radius, parameters)
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.fusion = ContactFusion(parameters.fusion_time)
 
@@ -161,7 +161,7 @@ class ContactInference:
 
     def _hypothesis(self, i: int, fit: Fit, reasons: Reason, instants: int, late: float) -> Hypothesis:
         cover = self._covers[i]
-        start, end = cover.start[0], cover.end[0]
+        start, end = cover.start, cover.end
         is_unknown = cover.is_moment_only or fit.torque_position_sd > end - start
         residual = fit.residual / instants
         if cover.is_moment_only:
@@ -174,9 +174,7 @@ class ContactInference:
         place, (f1, f2, along) = fit.position, (*fit.force, 0.0)
         if is_unknown:
             place, (f1, f2, along) = start if fit.is_at_start else end, fit.smallest
-        share = (place - start) / (end - start)
         fx, fy, fz = [f1 * e1 + f2 * e2 + along * e3 for e1, e2, e3 in cover.ways]
-        point = [first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)]
         force = fx, fy, fz
         return Hypothesis(
             cover=cover.name,
@@ -190,7 +188,7 @@ class ContactInference:
             is_lower_bound=is_unknown,
             direction=math.atan2(f2, f1),
             direction_sd=fit.direction_sd,
-            moment=cross(point, force),
+            moment=cross(self._body.arm.covers.on_axis(cover.name, place), force),
             residual=residual,
             reasons=reasons,
         )
@@ -214,8 +212,8 @@ def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:
     )
     return _Cover(
         name=name,
-        start=start.tolist(),
-        end=end.tolist(),
+        start=float(start[0]),
+        end=float(end[0]),
         wrenches=np.hstack((forces, moments)),
         ways=np.column_stack((*across, axis)).tolist(),
         is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
