@@ -94,7 +94,7 @@ def parameter(
     unit : SI unit, empty for pure numbers and names.
     low, high : inclusive range of each number.
     choices : allowed strings.
-    live : True if a running node may take a new value.
+    live : True if a running node may take a new value; of every field of a class whose `are_live` is true it may.
     width : number of values of a list for each name that it runs over, which `aligned` checks.
     is_common : whether a single value of a list counts for all.
     length : number of values of a list that runs over no names; 0 for any.
@@ -131,7 +131,8 @@ def fields(cls: type) -> tuple[Field, ...]:
 
 @cache
 def _fields(cls: type) -> tuple[Field, ...]:
-    return tuple(_declared(cls))
+    are_live = getattr(cls, "are_live", False)
+    return tuple(field._replace(live=field.live or are_live) for field in _declared(cls))
 
 
 def _declared(cls: type) -> Iterator[Field]:

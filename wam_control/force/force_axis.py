@@ -30,44 +30,37 @@ UNTURNED = np.eye(3)  # rotation of the base frame
 class SensingParameters:
     """What disturbs the measured force, and how exactly it has to be known."""
 
-    torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True)
+    torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3)
     torque_fraction: float = parameter(
         "further part of this sd, as a fraction of the joint torque of the commanded force",
         high=1.0,
-        live=True,
     )
     estimated_torque_sd: float = parameter(
         "as torque_sd, with feedback contact_estimate, until the estimator computes it",
         "N m",
         low=1e-6,
         high=1e3,
-        live=True,
     )
-    estimated_torque_fraction: float = parameter(
-        "as torque_fraction, with feedback contact_estimate", high=1.0, live=True
-    )
+    estimated_torque_fraction: float = parameter("as torque_fraction, with feedback contact_estimate", high=1.0)
     friction: float = parameter(
-        "sd of the tangential force on the link, as a fraction of the commanded force", high=2.0, live=True
+        "sd of the tangential force on the link, as a fraction of the commanded force", high=2.0
     )
     zero_limit: float = parameter(
         "when a force begins at rest without a detected contact, the loop subtracts the external joint torques, if "
         "all of them are below this; 0: it subtracts none",
         "N m",
         high=1e3,
-        live=True,
     )
     least_apparent_mass: float = parameter(
         "the loop weights the joint torques such that the measured force has at least this apparent mass; a larger "
         "one permits a larger gain, but increases the error of oblique forces; 0: no bound",
         "kg",
         high=100.0,
-        live=True,
     )
     apparent_mass_limit: float = parameter(
         "if the apparent mass along a force is larger, the arm moves along it more slowly, by their ratio; 0: no limit",
         "kg",
         high=1e6,
-        live=True,
     )
 
 

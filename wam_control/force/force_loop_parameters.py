@@ -24,63 +24,51 @@ class LimitParameters:
         "largest speed of a joint towards its limit, per distance from the limit; 0: joint limits are not watched",
         "1/s",
         high=100.0,
-        live=True,
     )
     joint_acceleration: float = parameter(
         "largest acceleration of a joint by commands, except away from a push; 0: no limit",
         "rad/s^2",
         high=1e4,
-        live=True,
     )
-    joint_margin: float = parameter("distance from its limit at which a joint has to stop", "rad", high=1.0, live=True)
-    contact_force: float = parameter("largest measured force on the arm; above it the arm moves away", "N", live=True)
+    joint_margin: float = parameter("distance from its limit at which a joint has to stop", "rad", high=1.0)
+    contact_force: float = parameter("largest measured force on the arm; above it the arm moves away", "N")
     whole_force: float = parameter(
         "largest magnitude of the force at the contact, in all directions together, as a multiple of the commanded "
         "force; above it the arm moves away",
-        live=True,
     )
     impact: float = parameter(
         "largest predicted impact (3.1) on a surface of guard.contact_stiffness, as a multiple of the commanded "
         "force; it limits the speed before the contact; 0: no limit",
         high=1e3,
-        live=True,
     )
-    settling_time: float = parameter(
-        "time after which a force that is still not reached is reported", "s", low=1e-3, live=True
-    )
+    settling_time: float = parameter("time after which a force that is still not reached is reported", "s", low=1e-3)
     free_travel: float = parameter(
         "largest travel along a commanded force that is not reached; also largest travel against this force under a "
         "push. Beyond it, the arm holds its position",
         "m",
-        live=True,
     )
     tolerance: float = parameter(
         "tolerated error of a force, as a fraction of the commanded force; with a smaller error the force counts as "
         "reached",
-        live=True,
     )
     doubt: float = parameter(
         "largest ratio of predicted to tolerated error with which a force is applied; with a larger limit fewer "
         "forces are refused and more are wrong",
         low=0.01,
-        live=True,
     )
     cycle_force: float = parameter(
         "smallest limit cycle that is reported: measured force, peak to peak, as a fraction of the commanded force",
-        live=True,
     )
     surface_speed: float = parameter(
         "expected speed of the surface along the force; the force lags behind the motion, which counts as an error",
         "m/s",
         high=10.0,
-        live=True,
     )
     slide_speed: float = parameter(
         "expected speed of the surface across the force; a sloping surface then also moves along the force, which "
         "counts as an error",
         "m/s",
         high=10.0,
-        live=True,
     )
 
 
@@ -88,6 +76,7 @@ class LimitParameters:
 class ForceLoopParameters:
     """Gains and limits of the force loop."""
 
+    are_live = True
     guard: GuardParameters
     sensing: SensingParameters
     limits: LimitParameters
@@ -96,84 +85,77 @@ class ForceLoopParameters:
         "hybrid: control of the force in its direction, of the posture in all others; open_loop: J^T F fed forward, no "
         "feedback",
         choices=("hybrid", "open_loop"),
-        live=True,
     )
     feedback: str = parameter(
-        "source of the measured force F_c", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
+        "source of the measured force F_c", choices=("joint_sensors", "contact_estimate", "joint_position")
     )
     force_gain: tuple[float, ...] = parameter(
         "G_I of each axis x y z of the force command's frame, or one for all: velocity per force error",
         "m/s/N",
         high=100.0,
-        live=True,
     )
     force_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each axis (5.23), or one for all: position per force error", "m/N", high=100.0, live=True
+        "G_P of each axis (5.23), or one for all: position per force error", "m/N", high=100.0
     )
     force_error_limit: tuple[float, ...] = parameter(
-        "saturation of F_error of each axis, or one for all; it must exceed the deadband", "N", live=True
+        "saturation of F_error of each axis, or one for all; it must exceed the deadband", "N"
     )
     force_deadband: tuple[float, ...] = parameter(
-        "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3, live=True
+        "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3
     )
-    force_limit: float = parameter("largest force that may be commanded", "N", high=1e3, live=True)
+    force_limit: float = parameter("largest force that may be commanded", "N", high=1e3)
     torque_gain: tuple[float, ...] = parameter(
-        "G_I of each joint whose torque is commanded, or one for all", "rad/s/(N m)", high=100.0, live=True
+        "G_I of each joint whose torque is commanded, or one for all", "rad/s/(N m)", high=100.0
     )
     torque_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each joint, or one for all", "rad/(N m)", high=100.0, live=True
+        "G_P of each joint, or one for all", "rad/(N m)", high=100.0
     )
     torque_error_limit: tuple[float, ...] = parameter(
-        "saturation of the torque error of each joint, or one for all; it must exceed the deadband", "N m", live=True
+        "saturation of the torque error of each joint, or one for all; it must exceed the deadband", "N m"
     )
     torque_deadband: tuple[float, ...] = parameter(
-        "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3, live=True
+        "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3
     )
-    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", high=1e3, live=True)
+    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", high=1e3)
     delay_samples: int = parameter(
-        "additional delay of the velocity that the force law commands, in outer periods", low=0, high=20, live=True
+        "additional delay of the velocity that the force law commands, in outer periods", low=0, high=20
     )
     force_feedforward: float = parameter(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it "
         "accelerates a free arm towards the surface",
         high=1.0,
-        live=True,
     )
     friction_feedforward: float = parameter(
         "fraction of the model's dry friction that is fed forward along the commanded motion during a "
         "force; none with feedback contact_estimate",
         high=1.0,
-        live=True,
     )
-    posture_gain: float = parameter("joint velocity per error of the posture", "1/s", high=1e3, live=True)
+    posture_gain: float = parameter("joint velocity per error of the posture", "1/s", high=1e3)
     joint_speed_limit: float = parameter(
-        "largest joint speed that is commanded for posture and force", "rad/s", high=1e3, live=True
+        "largest joint speed that is commanded for posture and force", "rad/s", high=1e3
     )
-    force_filter: float = parameter("time constant of the low pass on the measured force", "s", high=10.0, live=True)
+    force_filter: float = parameter("time constant of the low pass on the measured force", "s", high=10.0)
     spring_stiffness: tuple[float, ...] = parameter(
-        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", live=True
+        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad"
     )
     spring_rest: tuple[float, ...] = parameter(
-        "joint angle at which this spring is relaxed", "rad", low=-13.0, high=13.0, live=True
+        "joint angle at which this spring is relaxed", "rad", low=-13.0, high=13.0
     )
     contact_source: str = parameter(
         "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
         "enough. If a force command in a cover's frame has a torque, this torque gives the position in both cases",
         choices=("estimated", "pinned"),
-        live=True,
     )
-    contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
-    contact_position: float = parameter("assumed contact position along that cover", "m", high=3.0, live=True)
+    contact_cover: str = parameter("cover that is assumed in contact while no contact is detected")
+    contact_position: float = parameter("assumed contact position along that cover", "m", high=3.0)
     contact_position_sd: float = parameter(
         "standard deviation of a pinned contact position",
         "m",
         high=1.0,
-        live=True,
     )
     link_probability_limit: float = parameter(
         "smallest probability of the estimated link with which the estimated contact position is used",
         high=1.0,
-        live=True,
     )
 
     @cached_property

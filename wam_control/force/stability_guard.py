@@ -42,32 +42,27 @@ class GuardParameters:
         "off: no guard; warn: report unstable parameters; refuse: refuse them; limit: lower the gains, and "
         "posture_gain where no force gain is stable with it",
         choices=("off", "warn", "refuse", "limit"),
-        live=True,
     )
-    contact_stiffness: float = parameter(
-        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, live=True
-    )
+    contact_stiffness: float = parameter("stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0)
     posture: tuple[float, ...] = parameter(
-        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0, live=True
+        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0
     )
     stability_fraction: float = parameter(
-        "accepted fraction of the largest gain that is stable without friction", low=0.05, high=1.0, live=True
+        "accepted fraction of the largest gain that is stable without friction", low=0.05, high=1.0
     )
     feedback_lag: float = parameter(
-        "time constant of the estimated force, with feedback contact_estimate", "s", high=10.0, live=True
+        "time constant of the estimated force, with feedback contact_estimate", "s", high=10.0
     )
     extra_delay: int = parameter(
         "inner periods by which a command may be later than timing.outer_delay, as in realtime",
         low=0,
         high=100,
-        live=True,
     )
     interval: float = parameter(
         "shortest time between two assessments while pose, force direction or contact position change",
         "s",
         low=0.01,
         high=3600.0,
-        live=True,
     )
 
 

@@ -292,27 +292,18 @@ def unit(vector: Triple) -> Triple:
 class TaskParameters:
     """Limits of tasks."""
 
-    speed_limit: float = parameter("largest speed along an axis of a task", "m/s", high=10.0, live=True)
-    joint_speed_limit: float = parameter(
-        "largest speed of a joint that is an axis of a task", "rad/s", high=10.0, live=True
-    )
-    least_damping: float = parameter(
-        "least damping of an impedance along an axis", "N s/m", low=1e-3, high=1e6, live=True
-    )
-    least_joint_damping: float = parameter(
-        "least damping of an impedance of a joint", "N m s/rad", low=1e-3, high=1e6, live=True
-    )
+    speed_limit: float = parameter("largest speed along an axis of a task", "m/s", high=10.0)
+    joint_speed_limit: float = parameter("largest speed of a joint that is an axis of a task", "rad/s", high=10.0)
+    least_damping: float = parameter("least damping of an impedance along an axis", "N s/m", low=1e-3, high=1e6)
+    least_joint_damping: float = parameter("least damping of an impedance of a joint", "N m s/rad", low=1e-3, high=1e6)
     largest_rate: float = parameter(
         "largest ratio of stiffness to damping of an impedance; also velocity per error of a commanded position",
         "1/s",
         high=100.0,
-        live=True,
     )
-    deadband: float = parameter(
-        "force along an impedance below which the arm does not yield", "N", high=100.0, live=True
-    )
+    deadband: float = parameter("force along an impedance below which the arm does not yield", "N", high=100.0)
     joint_deadband: float = parameter(
-        "torque of a joint impedance below which the joint does not yield", "N m", high=100.0, live=True
+        "torque of a joint impedance below which the joint does not yield", "N m", high=100.0
     )
 
     def fastest(self, is_joint: bool) -> tuple[float, str]:
