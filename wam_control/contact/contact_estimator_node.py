@@ -45,7 +45,7 @@ class ContactEstimatorNode:
 
     @reaction(
         Input("motor_states"),
-        Input("joint_sensors", absent="zero"),
+        Input("joint_sensors"),
         Input("force_command", age="command", answers=True),
         Input("task_command", age="command", answers=True),
         Input("joint_torque_command", "effort", age="command", answers=True),

@@ -118,7 +118,7 @@ class ForceLoopParameters:
     )
     torque_limit: float = parameter("largest joint torque that may be commanded", "N m", high=1e3)
     delay_samples: int = parameter(
-        "additional delay of the velocity that the force law commands, in outer periods", low=0, high=20
+        "additional delay of the velocity that the force law commands, in outer periods", high=20
     )
     force_feedforward: float = parameter(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it "

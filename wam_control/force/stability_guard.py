@@ -55,7 +55,6 @@ class GuardParameters:
     )
     extra_delay: int = parameter(
         "inner periods by which a command may be later than timing.outer_delay, as in realtime",
-        low=0,
         high=100,
     )
     interval: float = parameter(

@@ -50,7 +50,7 @@ class ScenarioNode:
 
     @reaction(
         Input("joint_states", "position"),
-        Input("contact/hypotheses", absent="zero"),
+        Input("contact/hypotheses"),
         outputs=("joint_posture_command", "force_command", "task_command", "sim/disturbance"),
     )
     def step(self, inputs: Inputs) -> Outputs:

@@ -44,7 +44,7 @@ class TransformNode:
 
     @reaction(
         Input("gravity_effort", "effort"),
-        Input("joint_effort_command", "effort", absent="zero"),
+        Input("joint_effort_command", "effort"),
         outputs=("motor_effort_command",),
     )
     def effort(self, inputs: Inputs) -> Outputs:
