@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from wam_description.arm import Arm
 from wam_description.cables import Cables
-from wam_description.parameters import aligned, parameter
+from wam_description.parameters import parameter, require_fit
 from wam_description.parts import Joints, Links, Motors
 
 Part = TypeVar("Part", Motors, Joints, Links, Cables)
@@ -18,16 +18,13 @@ FRICTION = ("static_friction", "dynamic_friction", "viscous_friction")
 class ModelMismatch:
     """Factors of the true plant on the configured values; without mismatch all are 1 and there is no payload."""
 
+    aligned_with = "mismatch", "motors"
     mass: tuple[float, ...] = parameter("factor on mass and inertia of each link", low=0.1, high=10.0)
     motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", high=10.0)
     joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", high=10.0)
     stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
     payload: float = parameter("unmodelled payload at the tool, in addition to arm.payload", "kg", high=100.0)
     torque_constant: tuple[float, ...] = parameter("factor on the torque of each motor per current", low=0.1, high=10.0)
-
-    def require_fit(self, arm: Arm) -> None:
-        """Refuse lists without one value for each motor."""
-        aligned("mismatch", arm.motors.names, self)
 
 
 def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
@@ -38,7 +35,7 @@ def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
     ParameterError
         if a list has not one value each, or a payload would tilt the principal axes of the last link.
     """
-    mismatch.require_fit(arm)
+    require_fit(mismatch, arm)
     by_motor = dict(zip(arm.motors.names, mismatch.stiffness, strict=True))
     stages = [by_motor[motor] for motor in arm.cables.stage_motors]
     motors = _scaled(arm.motors, mismatch.torque_constant, "torque_constant")

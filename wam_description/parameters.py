@@ -313,7 +313,10 @@ def require(condition: bool, message: str) -> None:
 
 
 def require_fit(own: Any, arm: Any) -> None:
-    """Refuse parameters that do not fit an arm, by the method `require_fit` of their class and of classes nested in it.
+    """Refuse parameters that do not fit an arm, by their class and by classes nested in it.
+
+    A class may have a method `require_fit`.  It may have `aligned_with` if its lists are `aligned` with the names of a
+    part of the arm: its dotted name, for the message, and that part.
 
     Raises
     ------
@@ -330,6 +333,9 @@ def _misfits(own: Any, arm: Any) -> Iterator[str]:
         if dataclasses.is_dataclass(value):
             yield from _misfits(value, arm)
     try:
+        if group_and_part := getattr(own, "aligned_with", ()):
+            group, part = group_and_part
+            aligned(group, getattr(arm, part).names, own)
         getattr(own, "require_fit", lambda arm: None)(arm)
     except ParameterError as error:
         yield str(error)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
-from wam_description.parameters import require
+from wam_description.parameters import require, require_fit
 from wam_driver.friction import LAWS, FrictionParameters, Presliding, each_shaft
 from wam_driver.thresholds import PLANT
 
@@ -44,7 +44,7 @@ class DryFriction:
     ) -> None:
         motors, joints = effects.dry(arm), arm.joints
         size = 2 * arm.n
-        parameters.require_fit(arm)
+        require_fit(parameters, arm)
         static = [*motors.static_friction, *joints.static_friction]
         dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]
         self._asymmetry = each_shaft(parameters.motor_asymmetry, parameters.joint_asymmetry, size)

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from typing import Protocol
 
-from wam_description.arm import Arm
-from wam_description.parameters import aligned, each, parameter
+from wam_description.parameters import each, parameter
 
 
 class FrictionLaw(Protocol):
@@ -109,6 +108,7 @@ class FrictionParameters:
     F_s and F_d are `static_friction` and `dynamic_friction` of `arm.motors` and `arm.joints`.
     """
 
+    aligned_with = "friction", "motors"
     law: str = parameter(
         "how static friction becomes dynamic friction; coulomb_stiction: as soon as the shaft moves; stribeck: "
         "gradually, as the velocity rises to about v_s",
@@ -144,10 +144,6 @@ class FrictionParameters:
         high=0.9,
         default=0.0,
     )
-
-    def require_fit(self, arm: Arm) -> None:
-        """Refuse lists that have neither one value nor one for each motor or joint."""
-        aligned("friction", arm.motors.names, self)
 
 
 COULOMB_STICTION = FrictionParameters(

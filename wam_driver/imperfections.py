@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from wam_description.arm import Arm
-from wam_description.parameters import aligned, parameter
+from wam_description.parameters import parameter
 
 
 @dataclass(frozen=True)
 class AmplifierParameters:
     """Imperfections of the amplifiers and the thermal time constant of the motors."""
 
+    aligned_with = "amplifier", "motors"
     thermal_time: float = parameter("thermal time constant of the motors' windings", "s", low=0.1, high=1e6)
     deadband: tuple[float, ...] = parameter("commanded current below which no current flows", "A", high=100.0)
     torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", high=1.0)
@@ -28,15 +28,12 @@ class AmplifierParameters:
     )
     delay: int = parameter("delay of the current loop, in periods", high=100, default=0)
 
-    def require_fit(self, arm: Arm) -> None:
-        """Refuse lists without one value for each motor."""
-        aligned("amplifier", arm.motors.names, self)
-
 
 @dataclass(frozen=True)
 class SensorParameters:
     """Imperfections of the sensors; with all zero they read true values."""
 
+    aligned_with = "sensors", "motors"
     encoder_resolution: tuple[float, ...] = parameter(
         "resolution of the motor angle; if it is not zero, the velocity is computed from the difference of two "
         "angles, one period apart",
@@ -57,7 +54,3 @@ class SensorParameters:
     strain_noise: tuple[float, ...] = parameter(
         "standard deviation of the noise of the strain torque", "N m", high=100.0
     )
-
-    def require_fit(self, arm: Arm) -> None:
-        """Refuse lists without one value for each motor or joint."""
-        aligned("sensors", arm.motors.names, self)

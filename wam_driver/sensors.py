@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import each
+from wam_description.parameters import each, require_fit
 from wam_description.signals import State
 from wam_driver.imperfections import SensorParameters
 
@@ -55,7 +55,7 @@ class Sensors:
     """Motor encoders, joint encoders and strain gauges of an arm."""
 
     def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
-        parameters.require_fit(arm)
+        require_fit(parameters, arm)
         n = arm.n
         self.motors = SideSensors(parameters.encoder_resolution, parameters.encoder_noise, (0.0,) * n, random)
         resolution = each(parameters.joint_encoder_resolution, n)

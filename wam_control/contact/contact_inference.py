@@ -16,7 +16,7 @@ from wam_control.contact.contact_fusion import ContactFusion, Torques
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
-from wam_description.parameters import require, rows
+from wam_description.parameters import require, require_fit, rows
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import ZERO, Triple
@@ -94,7 +94,7 @@ class ContactInference:
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
         self._body, self._parameters = body, parameters
         self._covers = covers = [_cover(arm, body, cover) for cover in rows(arm.covers)]
-        parameters.require_fit(arm)
+        require_fit(parameters, arm)
         ends = [cover.start for cover in covers], [cover.end for cover in covers]
         self._fit = ContactFit(*ends, arm.covers.radius, parameters)
         self._wrenches = np.array([cover.wrenches for cover in covers])

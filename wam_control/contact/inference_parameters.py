@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from wam_description.arm import Arm
-from wam_description.parameters import aligned, parameter
+from wam_description.parameters import parameter
 
 
 @dataclass(frozen=True)
 class InferenceParameters:
     """Prior probabilities of a contact, before it is detected."""
 
+    aligned_with = "inference", "covers"
     weights: tuple[float, ...] = parameter("relative frequency of contacts on each cover", low=1e-3, high=1e3)
     force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
@@ -37,7 +37,3 @@ class InferenceParameters:
         "probability from which the link in contact is identified", low=0.5, high=1.0
     )
     largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", high=1e6)
-
-    def require_fit(self, arm: Arm) -> None:
-        """Refuse lists that are not one value for each cover."""
-        aligned("inference", arm.covers.names, self)
