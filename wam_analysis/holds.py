@@ -12,7 +12,7 @@ from wam_analysis.held_messages import held_of, intervals, step_at, value_change
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers, Times
 from wam_control.force.contact_place import pinned_position
-from wam_control.force.task import AxisKind, TaskCommand, task_of
+from wam_control.force.task import TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import ForceCommand
@@ -82,9 +82,7 @@ def tasks_of(run: RecordedRun, arm: Arm | None) -> list[RecordedTask]:
 def task_forces(tasks: Iterable[RecordedTask]) -> Iterator[Hold]:
     """The forces at points of links in some tasks, in the order of time."""
     for task, begin, end in tasks:
-        forces = [
-            (i, axis) for i, axis in enumerate(task.axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value
-        ]
+        forces = [(i, axis) for i, axis in enumerate(task.axes) if axis.is_force and axis.cover and axis.value]
         for i, axis in forces:
             position = math.nan if axis.position is None else axis.position
             number = i if len(forces) > 1 else -1

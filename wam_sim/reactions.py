@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from wam_control.force.task import AxisKind, TaskCommand, watched_axes
+from wam_control.force.task import TaskCommand, watched_axes
 from wam_description.event import Code, Event
 from wam_description.event_text import sentence
 
@@ -106,7 +106,7 @@ def watched_times(tasks: Iterable[tuple[TaskCommand | None, int, int]]) -> list[
     times: list[tuple[list[str], int, int]] = []
     for task, begin, end in tasks:
         since = begin
-        axes = [axis.name for axis in watched_axes(task) if axis.kind is not AxisKind.FORCE or axis.joint >= 0]
+        axes = [axis.name for axis in watched_axes(task) if axis.is_joint or not axis.is_force]
         if times and (times[-1][0], times[-1][2]) == (axes, begin):
             _, since, _ = times.pop()
         times.append((axes, since, end))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.force.force_axis import UNTURNED, Angles, ForceAxes, ForceAxis, ForcePlace
-from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
+from wam_control.force.task import TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import BASE
@@ -43,12 +43,12 @@ class CommandedAxis(NamedTuple):
     @property
     def is_force(self) -> bool:
         """Whether a force or a torque is commanded along it."""
-        return self.of.kind is AxisKind.FORCE
+        return self.of.is_force
 
     @property
     def is_joint(self) -> bool:
         """Whether it is a joint."""
-        return self.of.joint >= 0
+        return self.of.is_joint
 
     @property
     def side(self) -> float:
@@ -90,7 +90,7 @@ class TaskAxes:
         """
         rotation = self.rotation(q, task.frame)
         in_frame = [
-            (-side if axis.kind is AxisKind.FORCE and (axis.value or 0.0) < 0.0 else side) * np.array(axis.direction)
+            (-side if axis.is_force and (axis.value or 0.0) < 0.0 else side) * np.array(axis.direction)
             for axis, side in zip(task.axes, sides, strict=True)
         ]
         directions = [rotation.dot(along) for along in in_frame]
@@ -104,9 +104,9 @@ class TaskAxes:
 
     def _disturbance(self, q: Angles, axis: TaskAxis, place: ForcePlace, direction: Array) -> list[Array]:
         """Torques (n,), N m, by which a force along an axis disturbs the others; a hand has no friction."""
-        if axis.joint >= 0 or not axis.is_sensed:
+        if axis.is_joint or not axis.is_sensed:
             return []
-        if axis.kind is AxisKind.IMPEDANCE:
+        if not axis.is_force:
             return [FORCE.hand * self.forces.lever(q, place.cover, place.position, direction)]
         return self.forces.disturbance(q, place, direction, _size(axis))
 
@@ -121,8 +121,8 @@ class TaskAxes:
         place: ForcePlace,
     ) -> CommandedAxis:
         axis = axes[i]
-        if axis.joint >= 0:
-            desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
+        if axis.is_joint:
+            desired = (axis.value or 0.0) if axis.is_force else 0.0
             return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, float(q[axis.joint]))
         point = np.array(self.forces.covers.on_axis(place.cover, place.position))
         at = float(direction.dot(self._body.point(q, place.cover, point)))
@@ -136,10 +136,10 @@ class TaskAxes:
             is_same = (axes[k].cover, axes[k].position) == (axis.cover, axis.position)
             others += [] if k == i else each[:1] if is_same else each
         sensed = self.forces.axis(q, place, direction, _size(axis), others)
-        desired = _size(axis) if axis.kind is AxisKind.FORCE else 0.0
+        desired = _size(axis) if axis.is_force else 0.0
         return CommandedAxis(axis, sensed.lever, direction, in_frame, desired, at, sensed, place)
 
 
 def _size(axis: TaskAxis) -> float:
     """Size of the force along an axis, N, as an unknown of the others."""
-    return abs(axis.value or 0.0) if axis.kind is AxisKind.FORCE else FORCE.hand
+    return abs(axis.value or 0.0) if axis.is_force else FORCE.hand

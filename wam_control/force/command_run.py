@@ -53,7 +53,7 @@ class AxisRun:
         self.touch = self.watch.touch
         self.anchor, self.wound_up, self.side, self.is_kept = math.nan, math.nan, 1.0, False
         self.rising = self._shown = 0.0
-        self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
+        self.of = of.bare
 
     @property
     def now(self) -> CommandedAxis:

@@ -131,12 +131,12 @@ def beyond(task: TaskCommand, own: ForceLoopParameters) -> str:
     """Why a task is refused: the first axis beyond a limit; '' if there is none."""
     for axis in task.axes:
         name, limit, unit = "", math.inf, ""
-        if axis.kind is AxisKind.FORCE:
+        if axis.is_force:
             name, limit, unit = "force_limit", own.force_limit, "N"
-            if axis.joint >= 0:
+            if axis.is_joint:
                 name, limit, unit = "torque_limit", own.torque_limit, "N m"
         elif axis.kind is AxisKind.VELOCITY:
-            (limit, name), unit = own.task.fastest(axis.joint >= 0), f"{axis.unit}/s"
+            (limit, name), unit = own.task.fastest(axis.is_joint), f"{axis.unit}/s"
         elif axis.kind is AxisKind.IMPEDANCE and (reason := own.task.too_stiff(axis)):
             return reason
         if reason := _excess(abs(axis.value or 0.0), name, limit, unit):

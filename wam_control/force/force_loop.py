@@ -261,7 +261,7 @@ class ForceLoop:
 
     def _places(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> list[ForcePlace]:
         lean = 0.0
-        if axis.joint >= 0:
+        if axis.is_joint:
             return [ForcePlace("", 0.0, 0.0)]
         if contact.cover and axis.position is None:
             direction = self._axes.rotation(self._pose, task.frame).dot(np.array(axis.direction))
@@ -543,8 +543,7 @@ def _task(
 ) -> tuple[TaskCommand | None, tuple[object, ...]]:
     """What is commanded as a task, and what makes it the same command as before, whatever its values are."""
     if task is not None:
-        kept = (axis._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0) for axis in task.axes)
-        return task, (TaskCommand, own.feedback, task.frame, *kept)
+        return task, (TaskCommand, own.feedback, task.frame, *(axis.bare for axis in task.axes))
     if force is None or not any(force.force):
         return None, ()
     size = math.hypot(*force.force)

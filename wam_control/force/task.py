@@ -53,9 +53,24 @@ class TaskAxis(NamedTuple):
     damping: float = 0.0
 
     @property
+    def is_force(self) -> bool:
+        """Whether a force or a torque is commanded along it."""
+        return self.kind is AxisKind.FORCE
+
+    @property
+    def is_joint(self) -> bool:
+        """Whether it is a joint."""
+        return self.joint >= 0
+
+    @property
+    def bare(self) -> "TaskAxis":
+        """The same axis whatever is commanded along it."""
+        return self._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
+
+    @property
     def is_sensed(self) -> bool:
         """Whether a force is measured along it."""
-        return self.kind in (AxisKind.FORCE, AxisKind.IMPEDANCE)
+        return self.is_force or self.kind is AxisKind.IMPEDANCE
 
     @property
     def speed(self) -> float:
@@ -65,14 +80,14 @@ class TaskAxis(NamedTuple):
     @property
     def unit(self) -> str:
         """Of a position along it."""
-        return "rad" if self.joint >= 0 else "m"
+        return "rad" if self.is_joint else "m"
 
     @property
     def name(self) -> str:
         """The axis in words."""
         kind = self.kind.name.lower()
-        if self.joint >= 0:
-            return f"{'torque' if self.kind is AxisKind.FORCE else kind} of joint {self.joint + 1}"
+        if self.is_joint:
+            return f"{'torque' if self.is_force else kind} of joint {self.joint + 1}"
         x, y, z = self.direction
         at, on = ("", "on") if self.position is None else (f" at {self.position:.3g} m", "along")
         return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}){at}{f' {on} {self.cover}' if self.cover else ''}"
@@ -154,8 +169,7 @@ def watched_axes(task: TaskCommand | None) -> tuple[TaskAxis, ...]:
     return tuple(
         axis
         for axis in axes
-        if axis.kind in (AxisKind.VELOCITY, AxisKind.POSITION)
-        or (axis.kind is AxisKind.FORCE and (axis.joint >= 0 or axis.value))
+        if axis.kind in (AxisKind.VELOCITY, AxisKind.POSITION) or (axis.is_force and (axis.is_joint or axis.value))
     )
 
 
@@ -181,7 +195,7 @@ def _axis(where: str, row: Sequence[float], arm: Arm) -> TaskAxis:
         at = covers[int(link)] if link >= 0 else "", None if math.isnan(place) else place, (x, y, z)
     given: tuple[Any, ...] = (whole, *at, wanted, rate, stiffness, damping)
     axis = checked(where, TaskAxis(AxisKind(int(kind)), *given), arm)
-    return axis if axis.joint >= 0 else axis._replace(direction=unit(axis.direction))
+    return axis if axis.is_joint else axis._replace(direction=unit(axis.direction))
 
 
 def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
@@ -266,7 +280,7 @@ def checked_task(task: TaskCommand, where: str = "") -> TaskCommand:
         names the axis.
     """
     for axis in task.axes:
-        if task.frame != BASE and axis.joint < 0 and _is_held(axis):
+        if task.frame != BASE and not axis.is_joint and _is_held(axis):
             raise ParameterError(
                 f"{where}{': ' * bool(where)}{axis.name} is in the frame of {task.frame}, which turns with it; "
                 "command positions in the base frame"
@@ -314,11 +328,11 @@ class TaskParameters:
 
     def damping(self, axis: TaskAxis) -> float:
         """Damping of an impedance, N s/m or N m s/rad."""
-        return axis.damping or (self.least_joint_damping if axis.joint >= 0 else self.least_damping)
+        return axis.damping or (self.least_joint_damping if axis.is_joint else self.least_damping)
 
     def too_stiff(self, axis: TaskAxis) -> str:
         """Why an impedance is refused, '' where it is not."""
-        name = "least_joint_damping" if axis.joint >= 0 else "least_damping"
+        name = "least_joint_damping" if axis.is_joint else "least_damping"
         least, damping = float(getattr(self, name)), self.damping(axis)
         if damping < least:
             return f"{axis.name}: damping is {damping:g}; allowed: task.{name}, {least:g}, and above"

@@ -393,7 +393,7 @@ def _require_free(
 ) -> None:
     """Refuse a posture (n,), rad, that moves joints which a task takes, as far as it is known from where, rad."""
     for axis in task.axes:
-        if axis.joint < 0:
+        if not axis.is_joint:
             continue
         taken = axis.value if axis.kind is AxisKind.POSITION else None
         if taken is None and start:
@@ -495,8 +495,8 @@ def _require_forces(where: str, steps: Sequence[ScenarioStep], limits: dict[str,
         largest = math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0)
         commanded = [("", "force_limit", largest)]
         for axis in step.task.axes if step.task else ():
-            if axis.kind is AxisKind.FORCE:
-                name = "torque_limit" if axis.joint >= 0 else "force_limit"
+            if axis.is_force:
+                name = "torque_limit" if axis.is_joint else "force_limit"
                 commanded.append((f"{axis.name}: ", name, abs(axis.value or 0.0)))
         for what, name, size in commanded:
             limit, unit = limits[name], LARGEST[name]
@@ -574,7 +574,7 @@ def _require_step(where: str, step: Any, shared: Shared) -> None:
     forces = ["force"] * (step.force != NO_FORCE)
     if step.task is not None:
         require_task(where, step.task, arm)
-        are_torques = all(axis.kind is AxisKind.FORCE and axis.joint >= 0 for axis in step.task.axes)
+        are_torques = all(axis.is_force and axis.is_joint for axis in step.task.axes)
         forces.append("torque" if are_torques else "task")
     _require_one(where, moves)
     _require_one(where, forces)
