@@ -29,6 +29,7 @@ from wam_description.configuration import Configuration, named_file
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint, PosturePath, Triple, Wrench
+from wam_description.small_matrices import cross
 
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; required",
@@ -84,9 +85,8 @@ class Push(NamedTuple):
 
     def torque(self, covers: Covers | None) -> Triple:
         """About the origin of the cover, N m; where no covers are known, the tube's axis is the x axis of its frame."""
-        x, y, z = covers.on_axis(self.cover, self.position) if covers else (self.position, 0.0, 0.0)
-        fx, fy, fz = self.force
-        return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+        point = covers.on_axis(self.cover, self.position) if covers else (self.position, 0.0, 0.0)
+        return cross(point, self.force)
 
     def acts(self, elapsed: float, dt: float) -> bool:
         """Whether it acts in the outer period that begins now; one within a single period acts for all of that.
