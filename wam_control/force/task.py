@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from operator import mul
 from typing import Any, NamedTuple
 
 from wam_control.task.scenario_values import is_one_of, number, numbers
@@ -120,7 +121,7 @@ def line_axes(arm: Arm, cover: str, point: Triple, along: Triple) -> tuple[TaskA
     length = arm.covers.length_of(cover)
     first, second = across(along)
     return tuple(
-        TaskAxis(AxisKind.POSITION, -1, cover, place, axis, _dot(axis, point))
+        TaskAxis(AxisKind.POSITION, -1, cover, place, axis, sum(map(mul, axis, point)))
         for place in (0.0, length)
         for axis in (first, second)
     )
@@ -290,10 +291,6 @@ def checked_task(task: TaskCommand, where: str = "") -> TaskCommand:
 
 def _is_held(axis: TaskAxis) -> bool:
     return axis.kind is AxisKind.POSITION or axis.stiffness > 0.0
-
-
-def _dot(a: Triple, b: Triple) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def unit(vector: Triple) -> Triple:
