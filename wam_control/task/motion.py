@@ -344,14 +344,15 @@ class _Straight:
         return Moving(position, [rate * way for way in self._way])
 
 
-class _Polynomials:
+class _Polynomials(NamedTuple):
     """One part of a trajectory: polynomials of angle and speed of each joint, coefficients (k, n), the lowest first."""
 
-    def __init__(self, orders: list[Array], duration: float, fastest: list[float]) -> None:
-        self._orders, self.duration, self.fastest = orders, duration, fastest
+    orders: list[Array]
+    duration: float
+    fastest: list[float]
 
     def at(self, time: float) -> Moving:
-        return Moving(*(np.asarray(polyval(time, order)).tolist() for order in self._orders))
+        return Moving(*(np.asarray(polyval(time, order)).tolist() for order in self.orders))
 
 
 _Part = _Straight | _Polynomials
