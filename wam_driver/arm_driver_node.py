@@ -1,10 +1,9 @@
 """What every node `driver` has, simulated or real: commands, services, status, and the reasons to brake."""
 
 import time
-from collections.abc import Callable
 from typing import Any
 
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 from wam_description.agreement import DIGESTS, disagreement
 from wam_description.event import RAISED, Code, Event, Level, fault
@@ -54,9 +53,9 @@ class ArmDriver(StackNode):
         self._reported: tuple[Any, ...] = ("",)
         self._informed = ("", True, "", False)  # mode, are nodes missing, advice, is a reset arm kept from moving
         self.inlets.feed("motor_current_command", self._take_currents, "effort")
-        self.serve("enable", SetBool, lambda request: self.enable() if request.data else self.disable())
-        self.serve("estop", Trigger, lambda _: self.estop())
-        self.serve("reset_fault", Trigger, lambda _: self.reset_fault())
+        self.serve("enable", lambda on: self.enable() if on else self.disable(), SetBool)
+        self.serve("estop", self.estop)
+        self.serve("reset_fault", self.reset_fault)
         self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
         self.create_timer(NODE_LIMITS.claim_period, self._look_at_nodes)
         if not is_lockstep:
@@ -103,16 +102,6 @@ class ArmDriver(StackNode):
         return False
 
     # what every driver does
-
-    def serve(self, name: str, kind: Any, answer: Callable[[Any], Answer]) -> None:
-        """Offer a service, which may change the status."""
-
-        def served(request: Any, response: Any) -> Any:
-            response.success, response.message = answer(request)
-            self.announce()
-            return response
-
-        self.create_service(kind, f"~/{name}", served)
 
     def enable(self) -> Answer:
         """Let the motors follow commands, unless there is a reason against it."""

@@ -3,7 +3,7 @@
 import time
 from typing import Any
 
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 from wam_description.interface import declared
 from wam_description.signals import Answer, Wrench
@@ -28,9 +28,9 @@ class DriverNode(ArmDriver):
         self.safety = self.driver.safety
         follow(self, own, self.driver.tune)
         self.inlets.feed("sim/disturbance", self._take_push)
-        self.serve("pause", SetBool, self._pause)
-        self.serve("reset", Trigger, lambda _: self.driver.reset())
-        self.serve("step", Trigger, lambda _: self._step())
+        self.serve("pause", self._pause, SetBool)
+        self.serve("reset", self.driver.reset)
+        self.serve("step", self._step)
         self.time: Lockstep | Realtime
         if timing.mode == "lockstep":
             self.time = Lockstep(
@@ -131,9 +131,9 @@ class DriverNode(ArmDriver):
         finally:
             self.time.take_push(stamp)  # also after a refused push: the state has its answer
 
-    def _pause(self, request: SetBool.Request) -> Answer:
-        self.time.pause(bool(request.data))
-        return Answer(True, "paused" if request.data else "running")
+    def _pause(self, on: bool) -> Answer:
+        self.time.pause(on)
+        return Answer(True, "paused" if on else "running")
 
     def _step(self) -> Answer:
         refusal = self.time.step() if self.is_paused else "the driver is running; call pause first"

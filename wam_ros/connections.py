@@ -1,14 +1,15 @@
 """What every node of the stack is on ROS: a place, parameters, inlets, outlets, health, and the other nodes."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
 from wam_description.event import RAISED, Event
 from wam_description.interface import Interface
-from wam_description.signals import NodeStatus
+from wam_description.signals import Answer, NodeStatus
 from wam_description.status import BUSY, HELD_UP
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
@@ -129,6 +130,19 @@ class StackNode(TolerantNode):
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised."""
         self.health.set_problem("exception", problem_of(RAISED, reason))
+
+    def announce(self) -> None:
+        """A service has answered, which may change the status."""
+
+    def serve(self, name: str, answer: Callable[..., Answer], kind: Any = Trigger) -> None:
+        """Offer a service; the answer to a SetBool takes its value."""
+
+        def served(request: Any, response: Any) -> Any:
+            response.success, response.message = answer() if kind is Trigger else answer(request.data)
+            self.announce()
+            return response
+
+        self.create_service(kind, f"~/{name}", served)
 
     def is_waiting(self) -> bool:
         """Whether the node waits for something else than its peers before it is ready."""

@@ -13,7 +13,6 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
 
 from wam_description.configuration import Configuration
 from wam_description.event import Code, Event, Level, fault
@@ -67,7 +66,7 @@ class AdaptedNode(StackNode):
         if self._is_realtime:
             STEPS.watch(declaration.name, self.health.report_long_step)
         for name in getattr(node, "services", ()):
-            self.create_service(Trigger, f"~/{name}", _answering(getattr(node, name)))
+            self.serve(name, getattr(node, name))
 
     @property
     def done(self) -> bool:
@@ -251,14 +250,6 @@ class AdaptedNode(StackNode):
         self.get_logger().error(refusal)
         if refused := getattr(self.node, "refused", None):
             self._publish(0, refused(refusal))
-
-
-def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:
-    def serve(_: Any, response: Any) -> Any:
-        response.success, response.message = method()
-        return response
-
-    return serve
 
 
 def make_node(entry: str, **ros: Any) -> Node:

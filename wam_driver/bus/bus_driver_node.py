@@ -3,8 +3,6 @@
 import time
 from typing import Any
 
-from std_srvs.srv import Trigger
-
 from wam_description.arm import Shared
 from wam_description.event import fault
 from wam_description.interface import declared
@@ -38,7 +36,7 @@ class BusDriver(ArmDriver):
         self.safety = Safety(self._release, lambda: self.hardware.brake(True), held)
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
-        self.serve("confirm_home", Trigger, self._confirm_home)
+        self.serve("confirm_home", self._confirm_home)
         self.create_timer(self.shared.timing.period, self._run)
 
     def make_hardware(self, shared: Shared, own: Any) -> Any:
@@ -145,7 +143,7 @@ class BusDriver(ArmDriver):
         self.hardware.stop()
         return super().estop()
 
-    def _confirm_home(self, _: Any) -> Answer:
+    def _confirm_home(self) -> Answer:
         if self.hardware.confirm_home():
             return Answer(True, "the zero is set")
         return Answer(False, f"refused: the driver does not wait for the home pose; {self.advice}".removesuffix("; "))
