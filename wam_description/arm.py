@@ -33,18 +33,16 @@ class Covers:
     names: tuple[str, ...] = parameter("cover names; contacts and pushes use them as frame ids")
     links: tuple[str, ...] = parameter("link that carries the cover")
     origin: tuple[float, ...] = parameter(
-        "origin of the cover's frame in its link's frame, x y z", "m", low=-3.0, high=3.0, width=3
+        "origin of the cover's frame in its link's frame, x y z", "m", within=3.0, width=3
     )
     rotation: tuple[float, ...] = parameter(
-        "rotation from the link's axes to the cover's, roll pitch yaw", "rad", low=-6.3, high=6.3, width=3
+        "rotation from the link's axes to the cover's, roll pitch yaw", "rad", within=6.3, width=3
     )
     length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", high=3.0)
     start: tuple[float, ...] = parameter(
-        "start of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0, width=3
+        "start of the tube's axis in the cover's frame, x y z", "m", within=3.0, width=3
     )
-    end: tuple[float, ...] = parameter(
-        "end of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0, width=3
-    )
+    end: tuple[float, ...] = parameter("end of the tube's axis in the cover's frame, x y z", "m", within=3.0, width=3)
     radius: tuple[float, ...] = parameter("outer radius of the tube, whose ends are rounded", "m", low=1e-4, high=0.5)
 
     def __post_init__(self) -> None:
@@ -80,16 +78,14 @@ class Arm:
     links: Links
     covers: Covers
     name: str = parameter("name of the arm, also of its URDF and MJCF")
-    joint_from_motor: tuple[float, ...] = parameter(
-        "matrix M of (A.5), q = M theta, row by row", low=-100.0, high=100.0
-    )
+    joint_from_motor: tuple[float, ...] = parameter("matrix M of (A.5), q = M theta, row by row", within=100.0)
     tool: tuple[float, ...] = parameter(
-        "origin of the tool frame in the last link's frame, x y z", "m", low=-3.0, high=3.0, length=3
+        "origin of the tool frame in the last link's frame, x y z", "m", within=3.0, length=3
     )
     payload: float = parameter(
         "mass carried at the tool, known to all nodes and part of the simulated arm", "kg", high=50.0,
     )  # fmt: skip
-    gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", low=-20.0, high=20.0, length=3)
+    gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", within=20.0, length=3)
     joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
 
     def __post_init__(self) -> None:

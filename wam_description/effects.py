@@ -18,10 +18,10 @@ class Ripples:
     """
 
     shafts: tuple[str, ...] = parameter("motor or joint that turns the pulley of each ripple, directly or by a gear")
-    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of the shaft", low=-1000.0, high=1e3)
+    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of the shaft", within=1e3)
     amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", high=100.0)
     cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1, high=1e4)
-    phase: tuple[float, ...] = parameter("phase at angle zero", "rad", low=-6.3, high=6.3)
+    phase: tuple[float, ...] = parameter("phase at angle zero", "rad", within=6.3)
 
     def __post_init__(self) -> None:
         aligned("effects.ripples", self.shafts, self)

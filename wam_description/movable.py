@@ -62,10 +62,10 @@ class FreeBodies(Solids, Countable):
         width=3,
     )
     positions: tuple[float, ...] = parameter(
-        "centre at power-up in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
+        "centre at power-up in the base frame, x y z of each", "m", within=100.0, width=3
     )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
+        "rotation from the base frame at power-up, roll pitch yaw of each", "rad", within=6.3, width=3
     )
     mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", high=1e3)
     ground_friction: tuple[float, ...] = parameter(
@@ -92,10 +92,10 @@ class Doors(Solids, Countable):
 
     counted_by = "mass"
     positions: tuple[float, ...] = parameter(
-        "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
+        "middle of the hinge in the base frame, x y z of each", "m", within=100.0, width=3
     )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame to the hinge's, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
+        "rotation from the base frame to the hinge's, roll pitch yaw of each", "rad", within=6.3, width=3
     )
     sizes: tuple[float, ...] = parameter(
         "three half lengths each: along the panel from the hinge, across it, along the hinge",
@@ -107,9 +107,9 @@ class Doors(Solids, Countable):
     hinge_friction: tuple[float, ...] = parameter("dry friction of the hinge", "N m", high=1e3)
     hinge_damping: tuple[float, ...] = parameter("viscous friction of the hinge", "N m s/rad", high=1e4)
     spring: tuple[float, ...] = parameter("stiffness of the hinge's spring", "N m/rad", high=1e5)
-    rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", low=-6.3, high=6.3)
-    lower: tuple[float, ...] = parameter("smallest angle of the door", "rad", low=-6.3, high=6.3)
-    upper: tuple[float, ...] = parameter("largest angle of the door", "rad", low=-6.3, high=6.3)
+    rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", within=6.3)
+    lower: tuple[float, ...] = parameter("smallest angle of the door", "rad", within=6.3)
+    upper: tuple[float, ...] = parameter("largest angle of the door", "rad", within=6.3)
 
     def __post_init__(self) -> None:
         self.check("world.doors")
@@ -131,7 +131,7 @@ class Motions(Countable):
     counted_by = "frequency"
     obstacles: tuple[str, ...] = parameter("obstacles that move")
     amplitude: tuple[float, ...] = parameter(
-        "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0, width=3
+        "direction and amplitude in the base frame, x y z of each", "m", within=10.0, width=3
     )
     frequency: tuple[float, ...] = parameter("frequency; 0: no motion", "Hz", high=100.0)
     begin: tuple[float, ...] = parameter("start, since power-up", "s", high=1e6)

@@ -78,6 +78,7 @@ def parameter(
     low: float = 0.0,
     high: float = 1e9,
     *,
+    within: float = 0.0,
     choices: tuple[str, ...] = (),
     live: bool = False,
     width: int = 1,
@@ -93,6 +94,7 @@ def parameter(
     doc : what the parameter is, one sentence.
     unit : SI unit, empty for pure numbers and names.
     low, high : inclusive range of each number.
+    within : largest size of numbers of both signs, in place of that range.
     choices : allowed strings.
     live : True if a running node may take a new value; of every field of a class whose `are_live` is true it may.
     width : number of values of a list for each name that it runs over, which `aligned` checks.
@@ -103,6 +105,8 @@ def parameter(
     follows : name of the parameter whose value it has where a configuration gives none; `like` sets it.
     """
     metadata = locals()  # the arguments
+    if metadata.pop("within"):
+        metadata |= {"low": -within, "high": within}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, kw_only=True, metadata=metadata)

@@ -48,12 +48,12 @@ class Joints:
     """The joints in Craig's Denavit-Hartenberg convention (A.4)."""
 
     names: tuple[str, ...] = parameter("joint names, as in JointState messages")
-    twist: tuple[float, ...] = parameter("alpha_(i-1), link twist before the joint", "rad", low=-6.3, high=6.3)
-    length: tuple[float, ...] = parameter("a_(i-1), link length before the joint", "m", low=-3.0, high=3.0)
-    offset: tuple[float, ...] = parameter("d_i, link offset along the joint axis", "m", low=-3.0, high=3.0)
-    lower: tuple[float, ...] = parameter("lower stop", "rad", low=-13.0, high=13.0)
-    upper: tuple[float, ...] = parameter("upper stop", "rad", low=-13.0, high=13.0)
-    start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad", low=-13.0, high=13.0)
+    twist: tuple[float, ...] = parameter("alpha_(i-1), link twist before the joint", "rad", within=6.3)
+    length: tuple[float, ...] = parameter("a_(i-1), link length before the joint", "m", within=3.0)
+    offset: tuple[float, ...] = parameter("d_i, link offset along the joint axis", "m", within=3.0)
+    lower: tuple[float, ...] = parameter("lower stop", "rad", within=13.0)
+    upper: tuple[float, ...] = parameter("upper stop", "rad", within=13.0)
+    start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad", within=13.0)
     armature: tuple[float, ...] = parameter("inertia of the pulleys that turn with the joint", "kg m^2", high=1e3)
     static_friction: tuple[float, ...] = parameter(
         "static friction F_s (breakaway torque) at the joint", "N m", high=1e3
@@ -106,7 +106,7 @@ class Links:
     names: tuple[str, ...] = parameter("link names, one per joint, as in frame ids")
     mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6, high=500.0)
     centre: tuple[float, ...] = parameter(
-        "centre of mass in the link's frame, x y z of each link", "m", low=-3.0, high=3.0, width=3
+        "centre of mass in the link's frame, x y z of each link", "m", within=3.0, width=3
     )
     inertia: tuple[float, ...] = parameter(
         "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
@@ -117,8 +117,7 @@ class Links:
     product: tuple[float, ...] = parameter(
         "elements xy xz yz of the same inertia tensor; zero if the axes are principal",
         "kg m^2",
-        low=-100.0,
-        high=100.0,
+        within=100.0,
         width=3,
     )
 

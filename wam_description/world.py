@@ -15,11 +15,9 @@ class Obstacles(Solids):
     """Surfaces that the covers can touch, fixed in the base frame."""
 
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
-    positions: tuple[float, ...] = parameter(
-        "centre in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
-    )
+    positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m", within=100.0, width=3)
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
+        "rotation from the base frame, roll pitch yaw of each", "rad", within=6.3, width=3
     )
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0",
@@ -43,7 +41,7 @@ class Springs(Countable):
     joints: tuple[str, ...] = parameter("joint of each spring")
     stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m")
     lever: tuple[float, ...] = parameter("distance of the spring from the axis of the joint", "m", low=1e-3, high=3.0)
-    rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", low=-13.0, high=13.0)
+    rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", within=13.0)
     bilateral: tuple[bool, ...] = parameter(
         "true if the spring also pulls; false: it only pushes towards larger angles"
     )
@@ -79,7 +77,7 @@ class Pushers(Solids, Countable):
     covers: tuple[str, ...] = parameter("cover that each presses on")
     positions: tuple[float, ...] = parameter("position along the cover where each touches first", "m", high=3.0)
     angles: tuple[float, ...] = parameter(
-        "direction of the force: angle about the x axis of the cover, from y towards z", "rad", low=-6.3, high=6.3
+        "direction of the force: angle about the x axis of the cover, from y towards z", "rad", within=6.3
     )
     force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", high=1e3)
     begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", high=1e6)
@@ -88,8 +86,8 @@ class Pushers(Solids, Countable):
     clearance: tuple[float, ...] = parameter(
         "distance from the link before and after contact", "m", low=1e-3, high=10.0
     )
-    slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s", low=-10.0, high=10.0)
-    turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s", low=-100.0, high=100.0)
+    slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s", within=10.0)
+    turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s", within=100.0)
 
     def __post_init__(self) -> None:
         self.check("world.pushers", PUSHER_SHAPES)

@@ -123,11 +123,10 @@ class FrictionParameters:
     stribeck_exponent: float = parameter("delta of exp(-(v/v_s)^delta) (law stribeck)", low=0.1, high=10.0)
     motor_asymmetry: tuple[float, ...] = parameter(
         "a of each motor: friction is 1 + a times as large in positive and 1 - a in negative motion",
-        low=-0.9,
-        high=0.9,
+        within=0.9,
         is_common=True,
     )
-    joint_asymmetry: tuple[float, ...] = parameter("the same for each joint", low=-0.9, high=0.9, is_common=True)
+    joint_asymmetry: tuple[float, ...] = parameter("the same for each joint", within=0.9, is_common=True)
     motor_load_factor: tuple[float, ...] = parameter(
         "friction of each motor per torque that the cables transmit to it", high=0.9, is_common=True
     )

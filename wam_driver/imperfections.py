@@ -20,8 +20,7 @@ class AmplifierParameters:
     torque_offset: tuple[float, ...] = parameter(
         "torque of each motor at a reported current of zero, due to the offset of its current sensor",
         "N m",
-        low=-100.0,
-        high=100.0,
+        within=100.0,
     )
     bandwidth: float = parameter(
         "bandwidth of the current loop, of first order; 0: unlimited", "Hz", high=1e5, default=0.0

@@ -138,9 +138,7 @@ class ForceLoopParameters:
     spring_stiffness: tuple[float, ...] = parameter(
         "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad"
     )
-    spring_rest: tuple[float, ...] = parameter(
-        "joint angle at which this spring is relaxed", "rad", low=-13.0, high=13.0
-    )
+    spring_rest: tuple[float, ...] = parameter("joint angle at which this spring is relaxed", "rad", within=13.0)
     contact_source: str = parameter(
         "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
         "enough. If a force command in a cover's frame has a torque, this torque gives the position in both cases",

@@ -45,7 +45,7 @@ class GuardParameters:
     )
     contact_stiffness: float = parameter("stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0)
     posture: tuple[float, ...] = parameter(
-        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0
+        "joint angles at which parameters are assessed before the arm moves", "rad", within=13.0
     )
     stability_fraction: float = parameter(
         "accepted fraction of the largest gain that is stable without friction", low=0.05, high=1.0

@@ -26,7 +26,7 @@ class DitherParameters:
         high=3.0,
         live=True,
     )
-    phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
+    phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", within=1.0)
 
     def require_fit(self, arm: Arm) -> None:
         """Refuse phases that are not one for each motor."""

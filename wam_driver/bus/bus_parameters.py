@@ -16,7 +16,7 @@ class BusParameters(DriverParameters):
     interface: str = parameter("of python-can, as socketcan; simulated: the plant with the controllers' bus before it")
     channel: str = parameter("of the interface, as can0; of a simulated bus the version of the controllers' firmware")
     home: tuple[float, ...] = parameter(
-        "joint angles of the home pose, at which `confirm_home` sets the zero", "rad", low=-13.0, high=13.0
+        "joint angles of the home pose, at which `confirm_home` sets the zero", "rad", within=13.0
     )
 
     def require_fit(self, arm: Arm) -> None:
