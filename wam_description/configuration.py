@@ -321,7 +321,7 @@ def packaged(name: str, kind: str = "configuration") -> Path:
     )
 
 
-def packaged_names(kind: str = "configuration") -> list[str]:
+def packaged_names(kind: str) -> list[str]:
     """Names of the configurations, or of the scenarios, that come with the package."""
     wanted = kind == "scenario"
     files = (path for folder in _present_folders() for path in folder.glob("*.yaml"))

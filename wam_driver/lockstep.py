@@ -55,7 +55,7 @@ class Lockstep:
         announce: Callable[[], None],
         stop: Callable[[Event], None],
         now: Callable[[], float],
-        faults: Callable[[], str] = str,
+        faults: Callable[[], str],
     ) -> None:
         timing = driver.timing
         self._driver, self._timing, self._interface = driver, timing, interface

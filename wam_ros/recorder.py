@@ -187,7 +187,7 @@ class Recorder:
         mode: str,
         writers: Callable[[str], Mapping[str, str]],
         namespace: str,
-        is_late: bool = False,
+        is_late: bool,
     ) -> None:
         self.failure, self._is_late = "", is_late
         self._received = 0

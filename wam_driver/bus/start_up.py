@@ -44,7 +44,7 @@ class StartUp(Host):
     woken : controllers that this start has woken.
     """
 
-    def __init__(self, line: Line, arm: Arm, home: Sequence[float], is_zero_lost: bool = False) -> None:
+    def __init__(self, line: Line, arm: Arm, home: Sequence[float], is_zero_lost: bool) -> None:
         super().__init__(line)
         self._home, self._is_zero_lost = arm.transmission.motor_positions(home), is_zero_lost
         self._constant = arm.motors.torque_constant
