@@ -19,6 +19,7 @@ from wam_description.parameters import ParameterError, rows
 from wam_description.rigid_body import Array
 from wam_description.world import World
 from wam_driver.thresholds import PLANT
+from wam_theory.rounding import rounded_down
 
 
 class Linearised(NamedTuple):
@@ -55,8 +56,7 @@ def longest_step(mode: Linearised, step: float) -> float:
     while above - below > 1e-4 * above:
         middle = 0.5 * (below + above)
         below, above = (below, middle) if _is_too_long(mode, middle) else (middle, above)
-    digit = 10.0 ** (math.floor(math.log10(above)) - 2)
-    return math.floor(below / digit) * digit
+    return rounded_down(below)
 
 
 def _is_too_long(mode: Linearised, step: float) -> bool:
