@@ -39,21 +39,13 @@ class TransmissionMap:
         self._forward, self._inverse = _terms(forward), _terms(inverse)
         self._forward_transposed, self._inverse_transposed = _terms(forward.T), _terms(inverse.T)
 
-    def joint_positions(self, theta: Sequence[float]) -> list[float]:
-        """Joint angles q = M theta, n, rad, of motor angles theta, n, rad (A.5)."""
+    def joint_motion(self, theta: Sequence[float]) -> list[float]:
+        """Joint angles q = M theta, n, rad, of motor angles theta, n, rad; or velocities of velocities (A.5)."""
         return _product(self._forward, theta)
 
-    def motor_positions(self, q: Sequence[float]) -> list[float]:
-        """Motor angles theta = M^-1 q, n, rad, of joint angles q, n, rad (A.5)."""
+    def motor_motion(self, q: Sequence[float]) -> list[float]:
+        """Motor angles theta = M^-1 q, n, rad, of joint angles q, n, rad; or velocities of velocities (A.5)."""
         return _product(self._inverse, q)
-
-    def joint_velocities(self, thetad: Sequence[float]) -> list[float]:
-        """Joint velocities M thetad, n, rad/s, of motor velocities, n, rad/s (A.5)."""
-        return _product(self._forward, thetad)
-
-    def motor_velocities(self, qd: Sequence[float]) -> list[float]:
-        """Motor velocities M^-1 qd, n, rad/s, of joint velocities, n, rad/s (A.5)."""
-        return _product(self._inverse, qd)
 
     def joint_torques(self, tau_motor: Sequence[float]) -> list[float]:
         """Joint torques M^-T tau_motor, n, N m, of motor torques, n, N m (A.5, by power)."""

@@ -82,7 +82,7 @@ class LimitWatch:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""
         self._beyond = [
             off + math.copysign(DRIVER.leeway, off) if abs(off) > half else 0.0
-            for off, half in zip(self._off(self._map.joint_positions(theta)), self._half, strict=True)
+            for off, half in zip(self._off(self._map.joint_motion(theta)), self._half, strict=True)
         ]
 
     def _off(self, q: Sequence[float]) -> list[float]:
@@ -91,7 +91,7 @@ class LimitWatch:
     def obstacle(self, theta: Sequence[float]) -> str:
         """Why an arm at the motor angles theta, (n,), rad, may not be enabled: no joint is so far beyond a stop."""
         for name, angle, middle, half in zip(
-            self._arm.joints.names, self._map.joint_positions(theta), self._middle, self._half, strict=True
+            self._arm.joints.names, self._map.joint_motion(theta), self._middle, self._half, strict=True
         ):
             if not abs(angle - middle) <= 3.0 * half:
                 return (
@@ -111,7 +111,7 @@ class LimitWatch:
         currents : of the motors, A, (n,).
         tensions : largest of each cable since the last check, N, (n,).
         """
-        q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
+        q, qd = self._map.joint_motion(theta), self._map.joint_motion(thetad)
         off, limits = self._off(q), self._limits
         if any(self._beyond):  # what was allowed is taken back as the joint returns
             self._beyond = [

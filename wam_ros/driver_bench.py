@@ -110,7 +110,7 @@ class DriverBench(StackClient):
     def _answer(self, stamp: int, state: State) -> None:
         tick = stamp // self.shared.timing.period_ns
         if tick % self.shared.timing.outer_divisor == 0:
-            q = self._map.joint_positions(state.position)
+            q = self._map.joint_motion(state.position)
             torque = self._map.motor_torques(self._body.gravity_torque(q).tolist())
             self.carrying = [t / k for t, k in zip(torque, self.motors.torque_constant, strict=True)]
         self.commanded = list(self.carrying)

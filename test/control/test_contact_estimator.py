@@ -179,10 +179,10 @@ def test_vibration_after_a_contact_is_no_new_one() -> None:
     def play(estimator: ContactEstimator, span: float, force: float, vibration: float) -> list[ContactEstimate]:
         found = []
         for tick in range(round(span / DT)):
-            np.add(pose, DT * np.array(transmission.joint_velocities(speed)), out=pose)
+            np.add(pose, DT * np.array(transmission.joint_motion(speed)), out=pose)
             pushed = force + vibration * min(1.0, tick / 100) * math.sin(2.0 * math.pi * 60.0 * tick * DT)
             torque = transmission.motor_torques((body.gravity_torque(pose) + rest - pushed * lever).tolist())
-            assert estimator.observe(State(transmission.motor_positions(pose.tolist()), speed, torque), None, DT)
+            assert estimator.observe(State(transmission.motor_motion(pose.tolist()), speed, torque), None, DT)
             if tick % OUTER == 0:
                 found.append(estimator.estimate())
         return found

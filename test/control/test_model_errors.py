@@ -315,7 +315,7 @@ def test_an_error_is_what_an_arm_has_more_as_in_the_covariance_of_its_model(
     for g, f in ((1.0, 1.0), (weight, friction)):
         observer = MomentumObserver(WAM, own, False)
         for theta in (0.003 * np.arange(300)[:, None] + [2.0, 30.0, 3.0, 9.0]).tolist():
-            carried = shafts.motor_torques(body.gravity_torque(shafts.joint_positions(theta)).tolist())
+            carried = shafts.motor_torques(body.gravity_torque(shafts.joint_motion(theta)).tolist())
             torque = g * np.array(carried) + f * np.array(WAM.motors.dynamic_friction)
             observer.observe(State(theta, [3.0] * 4, torque.tolist()), 1e-3)
         observer.torques()

@@ -21,8 +21,7 @@ def random_vectors(count: int) -> list[list[float]]:
 
 def test_maps_there_and_back_are_the_identity(transmission: TransmissionMap) -> None:
     pairs = [
-        (transmission.joint_positions, transmission.motor_positions),
-        (transmission.joint_velocities, transmission.motor_velocities),
+        (transmission.joint_motion, transmission.motor_motion),
         (transmission.joint_torques, transmission.motor_torques),
     ]
     for there, back in pairs:
@@ -33,14 +32,14 @@ def test_maps_there_and_back_are_the_identity(transmission: TransmissionMap) -> 
 
 def test_power_in_is_power_out(transmission: TransmissionMap) -> None:
     for thetad, tau_motor in zip(random_vectors(200), reversed(random_vectors(200)), strict=True):
-        qd, tau = transmission.joint_velocities(thetad), transmission.joint_torques(tau_motor)
+        qd, tau = transmission.joint_motion(thetad), transmission.joint_torques(tau_motor)
         assert np.dot(tau, qd) == pytest.approx(np.dot(tau_motor, thetad), rel=1e-12, abs=1e-12)
 
 
 def test_inverse_is_the_one_of_the_errata(transmission: TransmissionMap) -> None:
     q1, q2, q3, q4 = 0.3, -0.7, 1.1, 0.4
     expected = [N1 * q1, -N2 * q2 - N2 / 2 * q3, N2 * q2 - N2 / 2 * q3, N4 * q4]
-    assert transmission.motor_positions([q1, q2, q3, q4]) == pytest.approx(expected, rel=1e-12)
+    assert transmission.motor_motion([q1, q2, q3, q4]) == pytest.approx(expected, rel=1e-12)
     assert transmission.motor_from_joint @ [q1, q2, q3, q4] == pytest.approx(expected, rel=1e-12)
 
 
@@ -52,7 +51,7 @@ def test_both_motors_carry_a_pitch_torque_in_halves(transmission: TransmissionMa
 
 def test_one_motor_and_joint_is_a_map_too() -> None:
     testbed = TransmissionMap([[1 / 14]])
-    assert testbed.joint_positions([14.0]) == pytest.approx([1.0])
+    assert testbed.joint_motion([14.0]) == pytest.approx([1.0])
     assert testbed.joint_torques([1.0]) == pytest.approx([14.0])
 
 
@@ -70,7 +69,7 @@ def test_impossible_matrix_is_refused(matrix: list[list[float]]) -> None:
 
 def test_wrong_number_of_values_is_refused(transmission: TransmissionMap) -> None:
     with pytest.raises(ValueError, match="got 3 values for 4 motors and joints"):
-        transmission.joint_positions([1.0, 2.0, 3.0])
+        transmission.joint_motion([1.0, 2.0, 3.0])
 
 
 def test_an_arm_whose_motors_do_not_move_every_joint_by_itself_is_refused_by_name() -> None:

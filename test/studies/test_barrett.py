@@ -141,10 +141,10 @@ def test_the_simulated_arm_has_them_too(arm: Arm, written: pin.Model, poses: np.
 def test_motors_turn_as_the_maker_says_and_power_passes_both_differentials(arm: Arm, poses: np.ndarray) -> None:
     through, random = arm.transmission, np.random.default_rng(6)
     for q in poses:
-        assert through.motor_positions(q.tolist()) == pytest.approx(motors_of(q.tolist()), abs=1e-12)
+        assert through.motor_motion(q.tolist()) == pytest.approx(motors_of(q.tolist()), abs=1e-12)
         qd, tau = random.uniform(-2.0, 2.0, (2, len(q))).tolist()
         at_joints = float(np.dot(tau, qd))
-        at_motors = float(np.dot(through.motor_torques(tau), through.motor_velocities(qd)))
+        at_motors = float(np.dot(through.motor_torques(tau), through.motor_motion(qd)))
         assert at_motors == pytest.approx(at_joints, rel=1e-12, abs=1e-12)
 
 
@@ -197,7 +197,7 @@ def test_the_upper_arm_shows_its_moment_only_and_elbow_and_wrist_are_watched(arm
     assert [name for name in arm.covers.names if not body.moves(name, (0.0, 0.0, 0.0))] == ["upper_arm"]
     q, qd = list(arm.joints.start), [0.5] * arm.n
     through = arm.transmission
-    theta, thetad = through.motor_positions(q), through.motor_velocities(qd)
+    theta, thetad = through.motor_motion(q), through.motor_motion(qd)
     none = [0.0] * len(q)
     watched = {one.quantity: one.value for one in LimitWatch(arm, 1e-9, 1e-9).watched(theta, thetad, none, none)}
     for cover in arm.covers.names[1:]:

@@ -117,7 +117,7 @@ def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
         for touch in recording.touches:
             if i == round(1e3 * (touch.begin + 0.2)):
                 wrench = touch.wrench(i * 1e-3, WAM.covers)
-                true = wrench @ body.cover_jacobian(WAM.transmission.joint_positions(state.position), touch.cover)
+                true = wrench @ body.cover_jacobian(WAM.transmission.joint_motion(state.position), touch.cover)
                 products += float(true @ estimator.estimate().external_torques)
                 squares += float(true @ true)
     assert squares > 1.0

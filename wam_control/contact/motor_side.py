@@ -98,7 +98,7 @@ class MotorSide:
         if fitted is None:
             return None
         (theta, thetad, tau_motor), dt = fitted
-        q, qd = self.map.joint_positions(theta), self.map.joint_velocities(thetad)
+        q, qd = self.map.joint_motion(theta), self.map.joint_motion(thetad)
         # with dither a shaft stops at both ends of each swing, held there by the external torque
         keep = 0.0 if self.has_dither else math.exp(-dt / self.parameters.friction_memory)
         motion, n = self.friction.of(np.array([*thetad, *qd]), keep, dt), len(theta)

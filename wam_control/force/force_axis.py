@@ -169,7 +169,7 @@ class ForceAxes:
         up through twice the friction, which takes them seconds.
         """
         arm = self._body.arm
-        turning = zip(arm.motors.dynamic_friction, self._map.motor_velocities(velocity), strict=True)
+        turning = zip(arm.motors.dynamic_friction, self._map.motor_motion(velocity), strict=True)
         turned = self._map.joint_torques([most * math.tanh(speed / FORCE.slow_motor) for most, speed in turning])
         moved = zip(arm.joints.dynamic_friction, velocity, turned, strict=True)
         return [torque + most * math.tanh(speed / FORCE.slow_joint) for most, speed, torque in moved]

@@ -45,14 +45,14 @@ class Transform:
             self._before = list(theta)  # the caller may change it
             angles = [angle - crept for angle, crept in zip(theta, self._creep, strict=True)]
         return State(
-            self._map.joint_positions(angles),
-            self._map.joint_velocities(motors.velocity),
+            self._map.joint_motion(angles),
+            self._map.joint_motion(motors.velocity),
             self._map.joint_torques(motors.effort),
         )
 
     def motor_velocity(self, velocity: Sequence[float]) -> list[float]:
         """Motor velocities (n,), rad/s, for joint velocities; empty stays empty."""
-        return self._map.motor_velocities(velocity) if velocity else []
+        return self._map.motor_motion(velocity) if velocity else []
 
     def motor_effort(self, gravity: Sequence[float], effort: Sequence[float]) -> list[float]:
         """Motor torques (n,), N m, for gravity plus the joint torques `effort`."""

@@ -46,7 +46,7 @@ class StartUp(Host):
 
     def __init__(self, line: Line, arm: Arm, home: Sequence[float], is_zero_lost: bool) -> None:
         super().__init__(line)
-        self._home, self._is_zero_lost = arm.transmission.motor_positions(home), is_zero_lost
+        self._home, self._is_zero_lost = arm.transmission.motor_motion(home), is_zero_lost
         self._constant = arm.motors.torque_constant
         self._motors = range(1, len(self._home) + 1)
         self.is_at_home, self.woken = False, list[int]()
