@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 
 from wam_analysis.table import markdown
+from wam_control.force.stability_guard import triple
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import Task, triple
+from wam_studies.force_benchmark.tasks import Task
 from wam_studies.force_benchmark.trial import perform
 
 STIFFNESS: Final = 4000.0  # N/m

@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wam_control.force.stability_guard import triple
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import ForceCommand, Triple
+from wam_description.signals import ForceCommand
 from wam_studies.force_benchmark.surfaces import Surface, is_clear, obstacles
 from wam_studies.identification.plants import drawn_cover, factors, log_uniform, mismatch
 
@@ -372,9 +373,3 @@ def _command(task: Task, fraction: float) -> dict[str, Any]:
         for surface, force in task.forces
     ]
     return {"task": TaskCommand("base", tuple(axes))}
-
-
-def triple(values: Any) -> Triple:
-    """Three numbers of an array (3,)."""
-    x, y, z = values.tolist()
-    return x, y, z
