@@ -227,8 +227,7 @@ class ForceAxes:
         """
         cover, position, position_sd = place[:3]
         size = max(force, FORCE.sized_force)
-        jacobian, point, _ = self._jacobian(q, cover, position, direction)
-        slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
+        jacobian, slide, _ = self._jacobian(q, cover, position, direction)
         friction = self._parameters.friction * size * _across(direction, direction)
         return [(size * direction).dot(jacobian), *friction.dot(jacobian), (position_sd * size * direction).dot(slide)]
 
@@ -243,11 +242,12 @@ class ForceAxes:
         return float(along.dot(self._body.point_jacobian(q, cover, point)) @ moved)
 
     def _jacobian(self, q: Angles, cover: str, position: float, normal: Array) -> tuple[Array, Array, Array]:
-        """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, the point, and the axis."""
+        """Jacobian (3, n) of a point of the surface, one radius off the tube's axis, its change per m, and the axis."""
         covers, rotation = self.covers, self._body.cover_pose(q, cover).rotation
         point = np.array(covers.on_axis(cover, position))
         point += covers.radius_of(cover) * rotation.T.dot(normal)
-        return self._body.point_jacobian(q, cover, point), point, rotation[:, 0]
+        jacobian = self._body.point_jacobian(q, cover, point)
+        return jacobian, self._body.point_jacobian(q, cover, point + ALONG) - jacobian, rotation[:, 0]
 
     def _push(self, along: Array, direction: Array) -> Array:
         """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
@@ -280,7 +280,7 @@ class ForceAxes:
         """
         parameters, n = self._parameters, len(q)
         cover, position, position_sd = place[:3]
-        jacobian, point, along = self._jacobian(q, cover, position, direction)  # friction acts at the surface
+        jacobian, slide, along = self._jacobian(q, cover, position, direction)  # friction acts at the surface
         lever: Array = direction.dot(jacobian)
         square = float(lever.dot(lever))
         if square <= FORCE.least_lever * FORCE.least_lever:
@@ -297,7 +297,6 @@ class ForceAxes:
         push = aside if is_side else direction
         friction = parameters.friction * size * _across(direction, push)
         tangential = friction.dot(jacobian)
-        slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
         press: Array = push.dot(jacobian)
         shift = push.dot(slide) * size
         shifted = friction.dot(slide)  # friction at another position has another lever
