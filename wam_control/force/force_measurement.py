@@ -68,7 +68,8 @@ class ForceMeasurement:
         self._tare = self._zero = Zero(0.0, none)
         self._q: Sequence[float] = ()
         self._velocity = list[float]()
-        self._steady, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
+        self._slow, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
+        self._steady = none  # torques of the world on the joints, filtered for long
         self.rested, self.speed = 0.0, math.inf
         self.torques = WorldTorques(none, none, None, none)
         self.restart()
@@ -76,7 +77,7 @@ class ForceMeasurement:
     def restart(self, torques: Sequence[float] = ()) -> None:
         """Forget the filtered torques and the load, or go on from other torques (n,), N m."""
         self._filter = LowPass(torques)
-        self._before = self._taken(np.array(self._steady.value)) if len(torques) else Zero(0.0, self._none)
+        self._before = self._taken(self._steady) if len(torques) else Zero(0.0, self._none)
         self.torques = self.torques._replace(now=self._none, before=self._none, acceleration=None)
 
     def step(self, own: ForceLoopParameters, given: ForceInput, is_pressing: bool) -> None:
@@ -95,7 +96,7 @@ class ForceMeasurement:
         self.speed = max(map(abs, self._speed.step(given.joints.velocity, FORCE.steady_time, dt)))
         rests = self.speed < MOTION.at_rest and any(given.joints.effort)  # brakes hold what is not measured
         self.rested = self.rested + dt if rests else 0.0
-        self._steady.step(torque.tolist(), FORCE.steady_time, dt)
+        self._steady = np.array(self._slow.step(torque.tolist(), FORCE.steady_time, dt))
         is_first = not self._filter.value
         counted = torque - self._zeros if is_touched or not own.is_estimated else self._none
         now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
@@ -107,11 +108,10 @@ class ForceMeasurement:
         stated = given.external_sd if own.is_estimated else None
         sd = np.maximum(stated, FORCE.least_sd) if stated else self._torque_sd
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
-        if self.rested > FORCE.friction_turn and not is_pressing:
-            steady = np.array(self._steady.value)
-            if np.all(np.abs(torque - steady) < FORCE.certain * self._torque_sd):
-                seen = self._taken(steady)
-                self._before = seen if seen.mass or not is_touched else self._before
+        is_resting = self.rested > FORCE.friction_turn and not is_pressing
+        if is_resting and np.all(np.abs(torque - self._steady) < FORCE.certain * self._torque_sd):
+            seen = self._taken(self._steady)
+            self._before = seen if seen.mass or not is_touched else self._before
 
     @property
     def _none(self) -> Array:
@@ -141,14 +141,14 @@ class ForceMeasurement:
 
     def tare(self) -> None:
         """Take the steady external torques as zero."""
-        self._tare = self._taken(np.array(self._steady.value) - self._zero.at(self._body, self._q))
+        self._tare = self._taken(self._steady - self._zero.at(self._body, self._q))
         self.free = self._zeros
         self.restart(self.resting.tolist())
 
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
-        return np.array(self._steady.value) - self._zeros
+        return self._steady - self._zeros
 
     @property
     def before(self) -> Array:
@@ -162,7 +162,7 @@ class ForceMeasurement:
 
     def zero(self, limit: float) -> None:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m."""
-        found = np.array(self._steady.value) - self._tare.at(self._body, self._q)
+        found = self._steady - self._tare.at(self._body, self._q)
         if float(np.abs(found).max()) <= limit:
             self._zero = self._taken(found)
             self.free = self._zeros
