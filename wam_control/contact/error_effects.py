@@ -48,9 +48,10 @@ class LinkEffects:
         load = np.concatenate((np.zeros(10 * n - 10), -point_mass(arm.tool)))
         self._per_error = np.column_stack((centres, load))
 
-    def of(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
+    def of(self, motion: FilteredMotion) -> Array:
         """Torques, (n, 3 n + 1), per m of the centres' coordinates in the frames of their links, and per kg."""
-        return self.body.inverse_dynamics_regressor(pose, velocity, acceleration).dot(self._per_error)
+        moves = motion.pose, motion.velocity, motion.acceleration
+        return self.body.inverse_dynamics_regressor(*moves).dot(self._per_error)
 
 
 class GaugeEffects:
@@ -66,7 +67,7 @@ class GaugeEffects:
         n = len(motion.model)
         effects = np.zeros((n, 4 * n + 1))
         effects.ravel()[:: 4 * n + 2] = -motion.model  # the diagonal
-        effects[:, n:] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
+        effects[:, n:] = self._links.of(motion)
         residual = motion.residual - self._payload * effects[:, -1]
         moving = motion.signals  # there are none
         return Observation(residual, effects, self._rest, moving, motion.pose, self._lasting)
@@ -135,7 +136,7 @@ class ErrorEffects:
         effects[:, 8 * n : 9 * n] = self._to_joints.dot(own)
         effects[:, 9 * n : 11 * n] = self._through * (-self._dynamic * slope)
         effects[:, 11 * n] = self._to_joints.dot(signals[-n:])
-        effects[:, 11 * n + 1 :] = self._links.of(motion.pose, motion.velocity, motion.acceleration)
+        effects[:, 11 * n + 1 :] = self._links.of(motion)
         residual = residual - given.payload[0] * effects[:, -1]
         at_rest, shape = self._sds
         variance = np.square(at_rest * resting) + np.square(shape * slow) + np.square(self._dynamic) * curved
