@@ -6,7 +6,7 @@ delay, is in the stamps (`wam_description.synchroniser`), so that the bits are t
 only passes through here; as `Any` it need not become one of C and back in each function.
 """
 
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -18,15 +18,15 @@ class MessageBus:
     """Hands each message at once to all that take its topic, in the order in which they began to listen."""
 
     def __init__(self) -> None:
-        self._takers: dict[str, list[Take]] = {}
+        self._takers = defaultdict[str, list[Take]](list)
 
     def listen(self, topic: str, take: Take) -> None:
         """Call a function with stamp, ns, and value of each message of a topic."""
-        self._takers.setdefault(topic, []).append(take)
+        self._takers[topic].append(take)
 
     def publisher(self, topic: str) -> Publish:
         """A function that publishes on a topic: stamp, ns, and value, and what is published in answer to them."""
-        takers = self._takers.setdefault(topic, [])
+        takers = self._takers[topic]
 
         def publish(stamp: Any, value: Any) -> None:
             for take in takers:
@@ -69,7 +69,7 @@ class QueuedBus(MessageBus):
         topic : its name.
         depth : messages that wait at most; of more the oldest is dropped.
         """
-        takers, following = self._takers.setdefault(topic, []), self._next
+        takers, following = self._takers[topic], self._next
         waiting: deque[tuple[Any, Any]] = deque(maxlen=depth)
 
         def publish(stamp: Any, value: Any) -> None:
