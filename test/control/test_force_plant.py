@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from arms import BODY, CONFIGURATION, WAM
 
+from wam_control.force.contact_place import torque_of_position
 from wam_control.force.force_loop_parameters import ForceLoopParameters, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_control.force.task import AxisKind, TaskCommand, joint_axes
@@ -96,22 +97,38 @@ def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
     assert result.mean == pytest.approx(5.0, rel=0.06)
 
 
+def moved(seconds: float, *posture: float, **more: Any) -> ScenarioStep:
+    return ScenarioStep("move", seconds, posture=posture, **more)
+
+
+def pressed(newtons: float, seconds: float, at: float = 0.0, rise: float = 0.0) -> ScenarioStep:
+    force = (0.0, -newtons, 0.0)
+    return ScenarioStep("press", seconds, force=ForceCommand(OUTER, force, torque_of_position(force, at)), rise=rise)
+
+
+REST, LOADED = (0.0, -1.0, 0.0, 1.0), {"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": (0.0, 0.5)}
+LOWERED = moved(3.0, 0.0, -2.1, 0.0, 1.45, until_force=1.5)
+ABOVE, STAY = moved(2.0, 0.0, -1.9, 0.0, 1.45), ScenarioStep("stay", 1.0)
+
+
 @pytest.mark.slow
-def test_a_payload_that_a_scenario_tares_is_no_part_of_a_force_in_another_pose() -> None:
-    rest, press = (0.0, -1.0, 0.0, 1.0), ForceCommand(OUTER, (0.0, -8.0, 0.0))
-    steps = [
-        ScenarioStep("release", 0.3, request="enable"),
-        ScenarioStep("go", 2.0, posture=rest),
-        ScenarioStep("rest", 0.8, posture=rest),
-        ScenarioStep("tare", 0.3, posture=rest, request="tare"),
-        ScenarioStep("above", 1.5, posture=(0.0, -1.8, 0.0, 1.45)),
-        ScenarioStep("lower", 3.0, posture=(0.0, -2.1, 0.0, 1.45), until_force=1.5),
-        ScenarioStep("press", 2.0, force=press),
-    ]
-    payload = {"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": (0.0, 0.5)}
-    run = Simulation(CONFIGURATION.with_values(payload), steps)
+@pytest.mark.parametrize(("before", "press", "given"), [
+    ([moved(2.8, *REST), moved(0.3, *REST, request="tare"), moved(1.5, 0.0, -1.8, 0.0, 1.45), LOWERED],
+     pressed(8.0, 2.0), LOADED),  # tared in another pose
+    ([moved(2.5, 0.0, -1.9, 0.0, 1.45)], pressed(8.0, 3.0, rise=0.5), {}),  # what rises from nothing
+    ([ABOVE, STAY, pressed(20.0, 2.0, 0.26), STAY], pressed(5.0, 2.0, 0.26), {}),  # what the velocity loops carry
+    ([moved(2.0, 0.0, -1.8, 0.0, 1.45), moved(1.0, 0.0, -1.93, 0.0, 1.45)], pressed(3.0, 4.0, 0.26), {}),  # in motion
+])  # fmt: skip
+def test_a_force_is_right_whatever_was_before(
+    before: list[ScenarioStep], press: ScenarioStep, given: dict[str, Any]
+) -> None:
+    steps = [ScenarioStep("release", 0.3, request="enable"), *before, press]
+    run = Simulation(CONFIGURATION.with_values(given), steps)
     assert run.play() == ""
-    assert math.hypot(*run.rows["sim/contact/wrench"][-1].values[:3]) == pytest.approx(8.0, abs=0.3)
+    begin, newtons = run.played[-1].begin, math.hypot(*press.force.force)
+    forces = [abs(row.values[1]) for row in run.rows["sim/contact/wrench"] if row.stamp >= begin]
+    assert forces[-1] == pytest.approx(newtons, rel=0.04)
+    assert max(forces) < 1.25 * max(newtons, forces[0])
 
 
 @pytest.mark.slow

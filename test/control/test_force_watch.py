@@ -48,7 +48,7 @@ class Pressed:
         for k in range(round(seconds / DT)):
             measured = force(k * DT) if callable(force) else force
             known = Belief(measured, measured, 0.1, chi2, Errors(torques=error), 0.5)
-            self.watch.touch.step(measured, FORCE, DT)
+            self.watch.touch.step(measured, FORCE, 0.0, DT)
             pattern = -measured * PRESS if torques is None else torques
             seen = Seen(known, way, touched, is_led)
             found.append(self.watch.step(self.axis, seen, pattern, self.own, DT))

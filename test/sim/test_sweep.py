@@ -94,19 +94,20 @@ def test_a_force_that_a_larger_one_on_another_link_hides_is_not_assessed(tmp_pat
     file, found = tmp_path / "two.yaml", []
     for size in (0.0, 15.0):
         push = f"push: {{cover: inner_link, contact_position: 0.02, newtons: [0.0, 0.0, {size}]}}"
+        force = "force: {frame: outer_link, newtons: [0.0, -8.0, 0.0], contact_position: 0.26}"
         file.write_text(f"""
 steps:
   - {{name: release, seconds: 0.3, request: enable}}
   - {{name: above, seconds: 2.0, posture: [0.0, -1.8, 0.0, 1.45]}}
   - {{name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}}
-  - {{name: press, seconds: 2.0, force: {{frame: base, newtons: [0.0, 0.0, -8.0]}}, {push}}}
+  - {{name: press, seconds: 2.0, {force}, {push}}}
 """)
         configuration = Configuration.load(packaged("wam")).with_values({"force_loop:limits.doubt": 5.0})
         (case,) = swept_scenario(configuration, load(file, configuration.shared), [{}])
         found.append(measure_scenario(case))
     assert [one.result.reported for one in found] == [(), ("Failed: correct link (another link than inner_link).",)]
     alone, hidden = (number(one, "press: true force") for one in found)
-    assert alone == pytest.approx(8.0, abs=3.0)  # without a known position the force is known to 2 N
+    assert alone == pytest.approx(8.0, abs=0.8)
     assert hidden == pytest.approx(float("nan"), nan_ok=True)
 
 

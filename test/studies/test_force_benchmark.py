@@ -63,7 +63,7 @@ def test_what_nobody_knows_is_in_the_true_arm_alone() -> None:
 
 @pytest.mark.parametrize("number", [0, 3, 4, 8])
 def test_the_plant_of_a_task_touches_nothing_and_is_the_true_arm(number: int) -> None:
-    task = DRAWN[number]
+    task = DRAWN[number]._replace(payload=0.0)
     configuration = configured(CONFIGURATION, task)
     driver = Driver(configuration.shared, configuration.node("driver", DriverParameters))
     assert driver.plant.data.ncon == 0

@@ -167,6 +167,7 @@ class CommandRun:
     approached : way of the posture along the forces to what they touch (n,), rad.
     free_at : where the arm last was free (n,), rad.
     is_moving : whether the arm still moves as it did when the command began.
+    may_zero : whether it was not free and at rest then, so that its zero is older.
     delayed : speeds along the axes that are still to come, m/s or rad/s.
     motions : what is reported of the motions along the axes, or of the joints in a posture.
     friction : that is fed forward, N m at the joints (n,), filtered.
@@ -190,16 +191,20 @@ class CommandRun:
         self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()
         self.approached = np.zeros_like(resting)
         self.free_at = q
-        self.is_moving = is_moving
+        self.is_moving, self.may_zero = is_moving, False
         self.still_sd = still_sd
         self.delayed = list[list[float]]()
         self.motions = defaultdict[int, MotionWatch](MotionWatch)
         self.friction = LowPass()
         self.search: Search | None = None
 
-    def go_on(self, before: "CommandRun") -> None:
-        """Of axes that were commanded before, keep where they touch and hold, and with what they press."""
+    def go_on(self, before: "CommandRun", is_touched: bool) -> None:
+        """Of axes that were commanded before, keep where they touch and hold, and with what they press.
+
+        Where something is touched already, the velocity loops carry the force of the others.
+        """
         for one in self.axes:
+            one.wound_up = math.inf if is_touched else math.nan
             for other in before.axes:
                 if (before.frame, other.of) == (self.frame, one.of):
                     one.place, one.anchor, one.wound_up = other.place, other.anchor, other.wound_up

@@ -190,8 +190,10 @@ class ForceLoop:
             admitted.restart(joints.position)  # the arm stays where it is
         admitted.step(own, given)
         task, key = _task(admitted.force, given.task, own)
-        if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.friction_turn):
-            self._begin(task, key, given.contact is not None and not contact.cover)
+        run, is_free = self._run, given.contact is not None and not contact.cover
+        waits = run.is_moving or (run.may_zero and is_free and run.held_at is not None)
+        if key != run.key or (waits and self._measurement.rested > FORCE.friction_turn):
+            self._begin(task, key, given.contact)
         self._find_axes(task, contact)
         if own.mode == "open_loop" and given.task is None:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(pose)))
@@ -228,18 +230,20 @@ class ForceLoop:
         self._velocity = np.zeros(len(self._pose))
         self._begin(None, ())
 
-    def _begin(self, task: TaskCommand | None, key: tuple[object, ...], is_free: bool = False) -> None:
+    def _begin(self, task: TaskCommand | None, key: tuple[object, ...], contact: Contact | None = None) -> None:
         """Something else is commanded: what a free arm at rest measures is the error of its model."""
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
         before, still_sd, resting = self._run, measurement.torques.sd, np.zeros(len(self._velocity))
-        is_zeroed = task is not None and bool(limit)
+        is_zeroed, may_zero = task is not None and bool(limit), False
         if is_zeroed and self._has_left:
-            if is_free and measurement.speed < MOTION.at_rest:
+            may_zero = contact is None or bool(contact.cover) or measurement.speed >= MOTION.at_rest
+            if not may_zero:
                 measurement.zero(limit)
             resting = measurement.before
         is_moving = is_zeroed and measurement.speed > FORCE.slow
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
-        self._run.go_on(before)
+        self._run.may_zero = may_zero
+        self._run.go_on(before, contact is not None and bool(contact.cover))
         self._moved = np.zeros(len(self._pose))
         if self.supervision.watch is not None:
             self.supervision.watch.restart()
@@ -288,7 +292,7 @@ class ForceLoop:
         for one in run.axes:
             axis, known = one.now, one.known
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, known.force))
-            one.touch.step(force, size, given.dt)
+            one.touch.step(force, size, known.errors.torques, given.dt)
             if not axis.desired:
                 continue
             way = 0.0 if run.held_at is not None or axis.is_joint else float(axis.along.dot(self._moved))

@@ -58,7 +58,7 @@ class ForceMeasurement:
     ----------
     torques : of the world on the joints, filtered.
     free : torques of the world on the joints (n,), N m, that counted as those of a free arm when they were taken.
-    rested : time for which the arm has been at rest, s.
+    rested : time for which the arm has been at rest, with steady torques, s.
     speed : mean speed of the fastest joint, rad/s; infinite where it is not known yet.
     """
 
@@ -68,7 +68,7 @@ class ForceMeasurement:
         self._tare = self._zero = Zero(0.0, none)
         self._q: Sequence[float] = ()
         self._velocity = list[float]()
-        self._slow, self._speed, self._acceleration = LowPass(), LowPass(), LowPass()
+        self._slow, self._slower, self._speed, self._acceleration = (LowPass() for _ in range(4))
         self._steady = none  # torques of the world on the joints, filtered for long
         self.rested, self.speed = 0.0, math.inf
         self.torques = WorldTorques(none, none, None, none)
@@ -94,9 +94,12 @@ class ForceMeasurement:
         dt, torque = given.dt, self._torque(own, given)
         self._q, self._torque_sd = given.joints.position, self._none + own.sensing_fed_back.torque_sd
         self.speed = max(map(abs, self._speed.step(given.joints.velocity, FORCE.steady_time, dt)))
-        rests = self.speed < MOTION.at_rest and any(given.joints.effort)  # brakes hold what is not measured
-        self.rested = self.rested + dt if rests else 0.0
         self._steady = np.array(self._slow.step(torque.tolist(), FORCE.steady_time, dt))
+        lasting = np.array(self._slower.step(self._slow.value, FORCE.friction_turn, dt))
+        is_steady = bool(np.all(np.abs(self._steady - lasting) < FORCE.certain * self._torque_sd))
+        # brakes hold what is not measured
+        rests = self.speed < MOTION.at_rest and is_steady and any(given.joints.effort)
+        self.rested = self.rested + dt if rests else 0.0
         is_first = not self._filter.value
         counted = torque - self._zeros if is_touched or not own.is_estimated else self._none
         now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
@@ -108,8 +111,7 @@ class ForceMeasurement:
         stated = given.external_sd if own.is_estimated else None
         sd = np.maximum(stated, FORCE.least_sd) if stated else self._torque_sd
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
-        is_resting = self.rested > FORCE.friction_turn and not is_pressing
-        if is_resting and np.all(np.abs(torque - self._steady) < FORCE.certain * self._torque_sd):
+        if self.rested > FORCE.steady_time and not is_pressing:
             seen = self._taken(self._steady)
             self._before = seen if seen.mass or not is_touched else self._before
 

@@ -80,9 +80,9 @@ class TouchWatch:
         self.is_there = self.has_been = False
         self._since = 0.0
 
-    def step(self, force: float, desired: float, dt: float) -> None:
-        """A force is measured, N, of a desired one, N."""
-        self.is_there = force >= FORCE.touch * desired > 0.0
+    def step(self, force: float, desired: float, sd: float, dt: float) -> None:
+        """A force is measured, N, of a desired one, N; by its standard deviation, N, nothing is touched."""
+        self.is_there = desired > 0.0 and force >= max(FORCE.touch * desired, sd)
         self.has_been = self.has_been or self.is_there
         self._since = self._since + dt if self.has_been else 0.0
 

@@ -106,7 +106,8 @@ def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
     """The result of a task that was played."""
     last = trace.forces[-OUTCOME.evaluated :]
     mean, peak = float(last.mean()), float(trace.forces.max())
-    cycle, limit = _cycle(task, trace), OUTCOME.overshoot * max(task.force, task.before) + trace.impact
+    largest = max(task.force, task.before, float(trace.forces[0]) if task.approach else 0.0)
+    cycle, limit = _cycle(task, trace), OUTCOME.overshoot * largest + trace.impact
     return TaskResult(
         outcome=_outcome(task, trace, mean, peak),
         mean=mean,

@@ -18,7 +18,7 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
-from wam_studies.force_benchmark.surfaces import Surface, is_clear, obstacles
+from wam_studies.force_benchmark.surfaces import SHAPE, Surface, is_clear, obstacles
 from wam_studies.identification.plants import drawn_cover, factors, log_uniform, mismatch
 
 Range = tuple[float, float]
@@ -91,6 +91,12 @@ class TaskRanges:
     longer: float = 5.0  # times `seconds`
     small_forces: Range = (1.0, 3.0)  # N
     soft: float = 4e3  # N/m, of their surface at most
+    touching: float = 0.1  # share, of those of one force at rest, whose arm touches the surface when it is commanded
+    away: Range = (0.01, 0.1)  # m, from where it comes
+    pressed: Range = (0.1, 0.8)  # of the force, of the surface at the depth to which the arm is sent
+    approach_time: float = 2.5  # s, in which it goes each way
+    carried: float = 0.5  # share of these that carry a payload, which is not declared
+    loads: Range = (0.05, 0.5)  # kg
 
 
 RANGES = TaskRanges()
@@ -117,6 +123,8 @@ class Task(NamedTuple):
     centres : m, by which the controllers are wrong about the centre of mass of each link, x y z of each; () for none.
     strain_noise : sd of each measured joint torque, N m.
     misplaced : m, by which a pinned position is declared too far along the link.
+    approach : joint angles (n,), rad, away from the surface and inside it, to which the arm goes first; none where it
+        does not touch before.
     """
 
     q: tuple[float, ...]
@@ -136,11 +144,17 @@ class Task(NamedTuple):
     centres: tuple[float, ...] = ()
     strain_noise: float = 0.0
     misplaced: float = 0.0
+    approach: tuple[tuple[float, ...], ...] = ()
 
     @property
     def forces(self) -> list[tuple[Surface, float]]:
         """Each surface with its force, N."""
         return [(self.surface, self.force), *([self.second] if self.second else [])]
+
+    @property
+    def approach_time(self) -> float:
+        """Time in which the arm goes to the surface, s; 0 where the force makes it touch."""
+        return RANGES.approach_time * len(self.approach)
 
     @property
     def mistake(self) -> float:
@@ -194,7 +208,24 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     task = Task(q, _moving(surface, conditions["ramp"], random), force, elbow.pose(q), **conditions)
     if random.random() < RANGES.doubled:
         return _doubled(body, task, random)
-    return _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
+    task = _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
+    is_plain = not task.before and not task.surface.frequency
+    return _touching(body, task, np.random.Generator(np.random.PCG64((seed, number, 4)))) if is_plain else task
+
+
+def _touching(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
+    """The task as it is, or with an arm that touches the surface already, and may carry a payload."""
+    if random.random() >= RANGES.touching:
+        return task
+    cover, position, direction, stiffness = task.surface[:4]
+    lever = np.array(direction) @ body.point_jacobian(task.q, cover, body.arm.covers.on_axis(cover, position))
+    depth = SHAPE.gap + float(random.uniform(*RANGES.pressed)) * task.force / stiffness
+    payload = log_uniform(random, *RANGES.loads) if random.random() < RANGES.carried else task.payload
+    ways = [
+        np.array(task.q) + lever * way / float(lever @ lever) for way in (-log_uniform(random, *RANGES.away), depth)
+    ]
+    within = [np.clip(q, body.arm.joints.lower, body.arm.joints.upper) for q in ways]
+    return task._replace(approach=tuple(tuple(q.tolist()) for q in within), payload=payload)
 
 
 def _in_time(task: Task, random: np.random.Generator) -> Task:
@@ -351,13 +382,14 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
 
 
 def steps(task: Task, seconds: float) -> list[ScenarioStep]:
-    """Release, ramp in small steps, the first force if there is one, and `seconds` of the whole force, or longer."""
+    """Release, touch, ramp in small steps, perhaps another force, and `seconds` of the whole force, or longer."""
     count = round(task.ramp / RANGES.ramp_step)
     rising = [RANGES.first + (1.0 - RANGES.first) * i / count for i in range(count)]
     before = task.before / task.force if task.before else 1.0
     ramp = [ScenarioStep("ramp", RANGES.ramp_step, **_command(task, before * fraction)) for fraction in rising]
     return [
         ScenarioStep("release", RANGES.release, request="enable"),
+        *(ScenarioStep("approach", RANGES.approach_time, posture=posture) for posture in task.approach),
         *ramp,
         *([ScenarioStep("press first", RANGES.first_held, **_command(task, before))] if task.before else []),
         ScenarioStep("press", task.longer * seconds, **_command(task, 1.0)),

@@ -126,6 +126,8 @@ class TaskWatch:
             run.step()
         if self._task.is_tared:
             self._node.tare()
+        for _ in range(round(self._task.approach_time / period)):
+            run.step()
         start, travel = self._along(plant.q), np.zeros(len(self._directions))
         forces, impact, stopped, velocity = [], 0.0, 0.0, plant.qd
         standing = self._standing  # with the scenario the command ends, and what was reported of it
