@@ -14,7 +14,7 @@ from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.foreign.stamps import Timed, timed_messages
 from wam_analysis.foreign.topic_map import COMMAND, TopicMap
 from wam_analysis.measures.runs import smallest
-from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
+from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 from wam_bag.columns import JOINT_FIELDS
@@ -85,29 +85,22 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
 def alternates(source: Source) -> bool:
     """Whether a quantity jumps away and back from message to message, as where two publishers share a topic.
 
-    Two messages away on either side a value is near one of both: at the turn of a fast vibration it is near none.
-    Messages of another publisher come in addition; single wrong values are in the place of right ones.
+    Messages of another publisher come in addition, sooner than usual: only the stamps distinguish it from a joint that
+    toggles or vibrates.  Single wrong values are in the place of right ones.
     """
     for quantity in source.values:
         one = source.only(quantity)
-        time, values = one.time, one.values[quantity]
-        if len(values) < SHAFT.fewest_samples:
+        if len(one.time) < SHAFT.fewest_samples:
             continue
-        before, last, here, then, after = sliding_window_view(values, 5).T
-        once = np.minimum(np.abs(here - last), np.abs(then - here))
-        near = [
-            np.minimum(np.abs(far - here), np.abs(far - next_to)) for far, next_to in ((before, last), (after, then))
-        ]
+        last, here, then = sliding_window_view(one.values[quantity], 3).T
         twice = np.abs(then - last)
-        coarse = max(
-            float(np.median(twice)),
-            finest if (finest := smallest(twice, float(np.ptp(values)))) < math.inf else 0.0,
-            CYCLE.still_shaft / STREAM.zero if quantity == "position" else 0.0,
-        )
-        away = once > STREAM.zero * np.maximum(np.maximum(*near), np.maximum(twice, coarse))
-        wait = time[3:-1] - time[1:-3]
-        is_more = wait < (1.0 - 0.5 * STREAM.pace) * np.median(wait)
-        if np.mean(away) > 0.5 or (quantity == "position" and np.mean(away & is_more) > STREAM.repeated / 2.0):
+        once = np.minimum(np.abs(here - last), np.abs(then - here))
+        finest = smallest(twice, float(np.ptp(here)))
+        coarse = max(float(np.median(twice)), finest if finest < math.inf else 0.0)
+        away = once > STREAM.zero * np.maximum(twice, coarse)
+        waits = np.sort([np.diff(one.time)[:-1], np.diff(one.time)[1:]], axis=0)
+        is_more = waits[0] < (1.0 - STREAM.pace) * np.median(waits[1])
+        if np.mean(away & is_more) > max(STREAM.repeated, np.mean(away)) / 2.0:
             return True
     return False
 
