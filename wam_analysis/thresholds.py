@@ -78,7 +78,6 @@ class CycleThresholds:
     phase_samples: int = 8  # samples for each of them
     few_samples: float = 8.0  # of a cycle, which are not folded: they may all miss its peak
     cycles: int = 3  # cycles that are needed
-    shortest_period: float = 2.0  # samples; what repeats faster cannot be seen
     # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
     correlated: float = 0.9
     sure: float = 0.8  # confidence from which a limit cycle is reported as one

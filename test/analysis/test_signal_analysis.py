@@ -85,6 +85,9 @@ def test_a_cycle_wider_than_the_band_does_not_settle_wherever_the_recording_stop
     assert force_response(time, fast, 0.0, 1.0, 1.0)[1].verdict is Verdict.LIMIT_CYCLE
     few = 0.2 * np.sin(0.5 * math.pi * np.arange(4000) + phase)  # all of four samples may miss the peak
     assert limit_cycle(time / 0.2, few).peak_to_peak == near(0.4)
+    often = 0.2 * np.sin(0.996 * math.pi * np.arange(4000) + phase)  # nearly two samples, which pass all phases slowly
+    assert limit_cycle(time, often)[:2] == near((0.4, 0.002 / 0.996))
+    assert limit_cycle(time[:300], often[:300]).alternates
 
 
 def test_the_three_strongest_lines_are_listed_beside_a_much_larger_motion():

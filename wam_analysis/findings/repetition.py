@@ -9,7 +9,7 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.pieces import Piece, pieces, rests
-from wam_analysis.foreign.source import Source
+from wam_analysis.foreign.source import Source, Treatment
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
@@ -23,6 +23,7 @@ LEAST = {"rad": 1e-4, "m": 1e-5, "rad/s": 1e-3, "m/s": 1e-4, "N m": 1e-3, "N": 1
 
 COMMANDED_CYCLE, LIMIT_CYCLE, UNKNOWN = "commanded", "limit cycle", "not known whether commanded"
 HARMONIC = "near a multiple of the commanded frequency"
+PLACED = (Treatment.SPREAD, Treatment.BETWEEN)
 ORIGINS = {  # in words
     LIMIT_CYCLE: "a limit cycle: it was not commanded",
     HARMONIC: f"{HARMONIC}: a limit cycle, or the commanded motion, which is not followed linearly",
@@ -49,8 +50,9 @@ def repetition_section(recording: AnalysedRecording) -> Section:
         own = None if command is None else command.only(quantity if quantity in command.values else "velocity")
         for piece in pieces(one, quantity):
             least = max(CYCLE.loud * piece.noise[quantity], LEAST[unit])
-            for found in _of_piece(piece, quantity, own, least):
-                (begin, end, cycle), origin, error = found
+            for (begin, end, cycle), origin, error in _of_piece(piece, quantity, own, least):
+                if cycle.alternates and any(each.what in PLACED for each in one.treated):
+                    continue  # as a motion does whose messages are evenly placed, but were not sent so
                 name = label if label not in taken else f"{label} from {begin:.1f} s"
                 taken.add(name)
                 change = 100.0 * (cycle.growth - 1.0)
@@ -59,13 +61,15 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 alike[origin].append(name + changes)
                 frequency = 1.0 / cycle.period
                 if origin in (LIMIT_CYCLE, UNKNOWN):
-                    at = shown(frequency, "Hz")
-                    text = f"{name} repeats at {at}, {shown(cycle.peak_to_peak, unit)} peak to peak"
+                    at = "" if cycle.alternates else shown(frequency, "Hz")
+                    how = f"repeats at {at}, {{}} peak to peak" if at else "alternates from message to message, by {}"
+                    text = f"{name} {how.format(shown(cycle.peak_to_peak, unit))}"
                     text += changes + ", not commanded" * (origin == LIMIT_CYCLE)
                     cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text, label))
+                size = "from message to message" if cycle.alternates else "cycle, peak to peak"
                 findings += [
-                    Finding(f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=origin, error=error),
-                    Finding(f"{name}: frequency", "Hz", frequency, note=origin),
+                    Finding(f"{name}: {size}", unit, cycle.peak_to_peak, note=origin, error=error),
+                    *[Finding(f"{name}: frequency", "Hz", frequency, note=origin)][: not cycle.alternates],
                     Finding(f"{name}: begin", "s", begin),
                     Finding(f"{name}: end", "s", end),
                     Finding(f"{name}: confidence", "", cycle.confidence),
@@ -153,7 +157,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
 def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterator[Episode]:
     """Episodes of a signal of a piece; where the stamps are irregular, their sizes are those of the recorded values."""
     for one in episodes(piece.time, value, least):
-        if piece.stamps is not piece.time:
+        if piece.stamps is not piece.time and not one.cycle.alternates:
             period = one.cycle.period
             first, last = (
                 CYCLE.edge * period * (at not in (piece.time[0], piece.time[-1])) for at in (one.begin, one.end)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.measures.limit_cycle import LimitCycle, limit_cycle
+from wam_analysis.measures.limit_cycle import LimitCycle, averaged, limit_cycle
 from wam_analysis.measures.runs import runs, smoothed
 from wam_analysis.thresholds import CYCLE
 from wam_bag.arrays import Mask, Numbers
@@ -126,8 +126,8 @@ def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan
 
 
 def _width(time: Numbers, period: float) -> int:
-    """Samples of two periods."""
-    return max(2 * round(period / float(time[1] - time[0])), 2)
+    """Samples over which a cycle is averaged."""
+    return 2 * round(0.5 * averaged(period / float(time[1] - time[0]), len(time))) or 4
 
 
 def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
@@ -136,7 +136,8 @@ def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
     Then less that of the rest, as the first mean leaves some of a strong slow motion.  In the first and the last period
     the mean goes on as in the next: a window that ends there is not two periods long.
     """
-    half = period / float(time[1] - time[0])
+    lag = period / float(time[1] - time[0])
+    half = 0.5 * averaged(lag, len(value)) or lag
     end = math.ceil(half)
     middle = np.arange(end, len(value) - end) + 0.5
     away = np.arange(1, end + 1) / end

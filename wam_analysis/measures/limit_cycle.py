@@ -16,13 +16,15 @@ class LimitCycle(NamedTuple):
 
     Attributes
     ----------
-    peak_to_peak : of the mean cycle, in the unit of the signal; NaN if none was found.
+    peak_to_peak : of the mean cycle, or most from sample to sample where it alternates, in the unit of the signal; NaN
+        if none was found.
     period : s; NaN if none was found.
     cycles : how many the recording holds.
     explained : fraction of the motion that the mean cycle explains.
     confidence : 0 to 1: that, less the relative change of its size from the first half to the second.  It is near 0
         for noise and single transients.
     growth : size of the second half over that of the first; 1 for a limit cycle.
+    alternates : whether it does so from sample to sample, so that these never pass its phases: its size is not known.
     """
 
     peak_to_peak: float
@@ -31,6 +33,7 @@ class LimitCycle(NamedTuple):
     explained: float
     confidence: float
     growth: float
+    alternates: bool = False
 
 
 NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, 0.0, math.nan)
@@ -61,9 +64,13 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     centre, flat = np.linspace(-1.0, 1.0, n), value - np.mean(value)
     level = flat - centre * float(centre @ flat) / float(centre @ centre)
     lag = _period(level) if math.isnan(period) else period / seconds
-    if not lag >= CYCLE.shortest_period:
+    if math.isnan(lag):
         return NO_CYCLE
     lag = _refined(level, lag)
+    if not averaged(lag, n):
+        likeness = max(0.0, -float(level[1:] @ level[:-1]) / float(level @ level))
+        most = float(np.percentile(np.abs(np.diff(level)), 95.0))
+        return LimitCycle(most, 2.0 * seconds, n / 2.0, likeness, likeness, 1.0, alternates=True)
     phase = np.arange(n) / lag % 1.0
     turn = 2.0 * math.pi * phase
     drift = np.column_stack([centre, np.cos(turn), np.sin(turn), np.ones(n)])
@@ -119,6 +126,10 @@ def _period(flat: Numbers) -> float:
     if not len(negative):
         return math.nan
     first = int(negative[0])
+    fast = 2 * size // 5
+    fastest = size / (fast + int(np.argmax(power[fast:])))  # of 2 to 2.5 samples, whose peak is at 2
+    if first == 1 and likeness[2] >= CYCLE.correlated * np.max(likeness[first:longest]):
+        return fastest
     three = likeness[np.arange(first, longest - 1) + np.arange(3)[:, None]]
     before, peak, after = three
     peaks = np.flatnonzero((peak >= before) & (peak > after) & (before + after > -2.0 * peak))
@@ -130,12 +141,20 @@ def _period(flat: Numbers) -> float:
     lags = first + 1 + peaks
     high = np.flatnonzero(heights >= CYCLE.correlated * np.max(heights))
     high = high[2 * lags[high] < 3 * lags[high[0]]]
-    return top(likeness, int(lags[high[np.argmax(heights[high])]]))
+    lag = int(lags[high[np.argmax(heights[high])]])
+    return top(likeness, lag) if lag > 2 else fastest
+
+
+def averaged(lag: float, n: int) -> float:
+    """Samples of two cycles, or in which those of a fast one pass its phases; 0 if n do not pass them three times."""
+    passed = lag / max(lag - 2.0, 1e-300)
+    return max(2.0 * lag, passed) if CYCLE.cycles * passed <= n else 0.0
 
 
 def _refined(flat: Numbers, lag: float) -> float:
     """The lag by the drift of the phase of its first harmonic: an error of it blurs the mean of many cycles."""
-    width = max(2 * round(lag), 2)
+    if not (width := 2 * round(0.5 * averaged(lag, len(flat)))):
+        return lag
     turns = flat * np.exp(-2j * np.pi * np.arange(len(flat)) / lag)
     total = np.concatenate([[0.0], np.cumsum(turns)])
     phase = np.unwrap(np.angle(total[width:] - total[:-width]))
