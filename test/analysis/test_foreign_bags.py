@@ -626,7 +626,7 @@ def recorded_late(effort: Any, how: float) -> Any:
 @pytest.mark.slow
 @pytest.mark.parametrize(("how", "drag", "weight", "count", "rise"), [
     (0, 0.4, WEIGHT, 0, 0), *((how, 0.0, WEIGHT, 0, 0) for how in (10.0, 20.0)),
-    (0, 0.0, 0.0, 2.0 * np.pi / 2**12, 0), (0, 0.0, 0.0, 0, 0.9),
+    (0, 0.0, 0.0, 2.0 * np.pi / 2**12, 0), (0, 0.0, 0.0, 0, 0.9), (0, 0.0, 0.0, 0, -0.6),
     *((how, 0.0, w, 0, 0) for how in (2, 4, 6) for w in (0, WEIGHT)),
 ])  # fmt: skip
 def test_an_effort_that_lags_or_holds_a_drag_gives_the_friction_all_the_same(

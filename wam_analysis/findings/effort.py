@@ -23,7 +23,7 @@ RECORD = (
 )
 FIT = (
     "The fit explains the effort by friction, inertia, weight, spring, drag (velocity squared) and, where they fit "
-    "better, a delay, and a rise of friction near rest. The standard errors include what it does not explain."
+    "better, a delay, and a change of friction near rest. The standard errors include what it does not explain."
 )
 NO_FRICTION = "No friction is identified."
 
@@ -60,7 +60,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         if math.isnan(found.inertia.value):
             alone.append(one.label)
         if math.isfinite(found.static.value):
-            remarks.append(f"near rest, dry friction rises to about {shown(found.static.value, effort)}")
+            remarks.append(f"at the slowest speed, dry friction is about {shown(found.static.value, effort)}")
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
         if lag > 0.0 or (lag and found.inertia.is_sure):  # an inertia that is not known looks like a lead
             remarks.append(f"the effort is {shown(abs(lag), 's')} {'behind' if lag > 0.0 else 'before'} the motion")
@@ -200,12 +200,15 @@ def _friction(unit: str, some: Sequence[Piece], window: float) -> tuple[Friction
     dynamic, viscous, inertia = (
         one._replace(error=math.hypot(one.error, more)) for one, more in zip(found[1:4], doubts.tolist(), strict=True)
     )
-    static = UNKNOWN if law is None else FrictionNumber(dynamic.value + found.factors[-2])
+    static = UNKNOWN
+    if law is not None:
+        slowest = int(np.argmin(np.where(np.abs(velocity) > rest, np.abs(velocity), math.inf)))
+        static = FrictionNumber(dynamic.value + float(np.sign(velocity[slowest]) * law[slowest] @ found.factors[-2:]))
     return Friction(static, dynamic, viscous, UNKNOWN if one_frequency else inertia, *found[4:]), shift * period
 
 
 def _rise(velocity: Numbers, speed: float, power: float) -> Numbers:
-    """The rise of dry friction towards rest by the law of Stribeck, and its change with the speed of the law."""
+    """The rise of dry friction towards rest by the law of Stribeck, or its fall, and its change with the speed of the law."""
     part = np.minimum((np.abs(velocity) / speed) ** power, 30.0)  # beyond, nothing is left
     return np.column_stack([np.sign(velocity) * np.exp(-part), np.sign(velocity) * part * np.exp(-part)])
 
@@ -215,12 +218,13 @@ def _stribeck(
 ) -> tuple[Numbers | None, Numbers]:
     """Columns of the law with which a fit leaves clearly less than without one, None for none.
 
+    The change with its speed is linear only where it is not larger than the rise, or the fall.
     Then by how much dry friction, viscous friction and inertia scatter between all laws with which it leaves as little.
     """
     speeds = np.geomspace(*SHAFT.stribeck) * max(float(np.nanpercentile(np.abs(velocity), 95.0)), SHAFT.joint_rest)
     laws = [_rise(velocity, speed, power) for power in (1.0, 2.0) for speed in speeds.tolist()]
     fits = [fitted(law) for law in laws]
-    rests = np.array([fit.residual if fit.factors[-2] > 0.0 else math.inf for fit in fits])
+    rests = np.array([fit.residual if abs(fit.factors[-1]) <= abs(fit.factors[-2]) else math.inf for fit in fits])
     if not np.min(rests) < SHAFT.better * without:
         return None, np.zeros(3)
     alike = [fit[1:4] for fit, rest in zip(fits, rests, strict=True) if SHAFT.better * rest <= np.min(rests)]
