@@ -320,6 +320,12 @@ def follows() -> list[Case]:
         sent = [*joint(late, late)[: len(late)], goal]
         return Case(f"a trajectory {more}", by_rosbags, sent, expected, "", NOTHING, ("/t: 1 message;",))
 
+    goals, way = np.arange(0.0, 21.0, 0.05), [0.0]  # streamed: each is replaced half way, and the next begins there
+    for at in goals[1:]:
+        way.append(0.5 * (way[-1] + path(at + 0.05)))
+    streamed = [Sent("/t", TRAJECTORY, at, at, "", {"joint_names": ["a"], "points": [
+        {"positions": [path(at + 0.1)], "time_from_start": {"nanosec": 100_000_000}}]}) for at in goals]  # fmt: skip
+    streamed += joint(path(time), np.interp(time - 0.1, goals, way))[: len(time)]
     both = time + 4e-4 * np.random.default_rng(5).random(len(time))
     alike = [s for topic, late in (("/js", 0.04), ("/cmd", 0.0)) for s in joints(
         topic, both, ["a"], position=np.interp(time - late, time, path(time))[:, None])]  # fmt: skip
@@ -329,6 +335,7 @@ def follows() -> list[Case]:
               *joints("/cmd", shaken, ["a"], position=path(coarse)[:, None])]  # fmt: skip
     return [
         Case("by whole periods", ros1, alike, {"a position: delay": 0.04, "a position: gain": 1.0}, "", to),
+        Case("a stream", by_rosbags, streamed, {"a position: delay": 0.1, "a position: gain": 1.0}),
         Case("by two periods", sqlite, locked, {"a position: delay": 0.01585, "a position: gain": 1.0}, "", to),
         *(Case(f"a clock {by:g} s off", sqlite, [s._replace(stamp=s.stamp + by * (s.topic == topic))
                for s in joint(path(time), path(time - 0.03))], {"a position: delay": 0.03 - min(by, 0.0)}, told, to)

@@ -208,7 +208,7 @@ def _friction(unit: str, some: Sequence[Piece], window: float) -> tuple[Friction
 
 
 def _rise(velocity: Numbers, speed: float, power: float) -> Numbers:
-    """The rise of dry friction towards rest by the law of Stribeck, or its fall, and its change with the speed of the law."""
+    """Rise or fall of dry friction towards rest by the law of Stribeck, and its change with the speed of the law."""
     part = np.minimum((np.abs(velocity) / speed) ** power, 30.0)  # beyond, nothing is left
     return np.column_stack([np.sign(velocity) * np.exp(-part), np.sign(velocity) * part * np.exp(-part)])
 

@@ -240,16 +240,19 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
 def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
     """The paths of trajectories, each until the next one begins.
 
-    They are straight between the points, cubic where these have velocities, and of the fifth degree where they have
+    Each begins where the one before is at that instant.  They are
+    straight between the points, cubic where these have velocities, and of the fifth degree where they have
     accelerations, too, as ros2_control interpolates them.
     """
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
     groups, times, held = list[Any](), [np.zeros(0, np.int64)], dict[tuple[str, ...], list[Numbers]]()
     wrong, (frame, *_) = 0, _frames(columns)
-    for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
+    ends = [*begins.tolist()[1:], math.inf]
+    for message, begin, end in zip(columns.messages, begins.tolist(), ends, strict=True):
         points, names = getattr(message, "points", ()), tuple(map(str, getattr(message, "joint_names", ())))
         if not points:
+            held = {}  # it cancels
             continue
         # JSON leaves out what is empty or 0
         knots = [begin + (_whole(getattr(point, "time_from_start", None)) or 0) for point in points]
@@ -264,14 +267,15 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
         last = end if math.isfinite(end) else knots[-1]
         step = max(PATH_STEP, (last - knots[0]) / PATH_SAMPLES)
         at = np.unique([*knots, *np.arange(knots[0], last, step).astype(np.int64)])
-        if not np.any(at < end):  # it was replaced before its first point
-            held = {names: [value[:1] for value in values]}
-            continue
         at = at[at < end]
         position, velocity, effort, acceleration = values
         each = ((position, velocity, acceleration), (velocity, acceleration), (effort,), (acceleration,))
+        stop = np.array([min(end, last)], np.int64)
+        # one of which no beginning is known, and that is replaced before its first point, stands there
+        held = {names: [_spline(np.maximum(stop, knots[0]), np.array(knots), *one) for one in each]}
+        if not len(at):  # it was replaced before its first point
+            continue
         taken = [_spline(at, np.array(knots), *one) for one in each]
-        held = {names: [value[-1:] for value in taken]}
         groups.append((np.arange(len(at)) + sum(map(len, times)), (at, frame, names, taken[:3])))
         times.append(at)
     found = joint_columns(np.concatenate(times), groups)
