@@ -326,6 +326,7 @@ def follows() -> list[Case]:
     streamed = [Sent("/t", TRAJECTORY, at, at, "", {"joint_names": ["a"], "points": [
         {"positions": [path(at + 0.1)], "time_from_start": {"nanosec": 100_000_000}}]}) for at in goals]  # fmt: skip
     streamed += joint(path(time), np.interp(time - 0.1, goals, way))[: len(time)]
+    stops = np.cumsum(0.004 * np.sign(np.sin(4.0 * time)) * (time % 0.7 < 0.4))
     both = time + 4e-4 * np.random.default_rng(5).random(len(time))
     alike = [s for topic, late in (("/js", 0.04), ("/cmd", 0.0)) for s in joints(
         topic, both, ["a"], position=np.interp(time - late, time, path(time))[:, None])]  # fmt: skip
@@ -351,6 +352,7 @@ def follows() -> list[Case]:
              {"a: frequency": 4.5 / math.pi, "a: cycle, peak to peak": 0.008}, "", to),
         Case("at its end", sqlite, joint(0.1 + 0.2 * (time > 20.99), 0.1 + 0.0 * time), {}, "", to),
         Case("does not", sqlite, joint(steps, 0.0 * steps), {}, "a position: it was commanded to move, and never", to),
+        Case("stops, late", sqlite, joint(stops, np.interp(time - 0.2, time, stops), 2), {}, "", to, (" as rest.",)),
         Case("a ramp", ros1, joint(ramp, np.interp(time - 0.1, time, ramp) + 0.5 * noise[:, 0]),
              {"a position: delay": 0.1}, "", to),
         trajectory([0.0, 1.5, 0.0, -0.5]), trajectory([0.0, 1.875, 0.0, -1.25, 0.0, 0.375], accelerations=[0.0]),

@@ -11,9 +11,10 @@ from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.findings.topics import in_words
 from wam_analysis.foreign.pieces import Piece, pieces, resolution, rests, ways
 from wam_analysis.foreign.source import Source
+from wam_analysis.measures.following import best_fit
 from wam_analysis.measures.runs import at_rest, runs, stays, without_turns
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import LAYOUT, SHAFT, STREAM
+from wam_analysis.thresholds import CYCLE, LAYOUT, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
 
 
@@ -107,6 +108,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     hidden = resolution(positions) * (SHAFT.noisy if has_velocity else SHAFT.stays)  # by noise
     moving = [q for q in ("velocity", "position") if q in source.values]
     moved = max(moving, key=lambda q: np.count_nonzero(np.isfinite(source.values[q])), default="")
+    late = _delay(source, command)
     for piece in pieces(source, moved) if moved else ():
         velocity = piece.values["velocity"]
         if has_velocity:
@@ -128,7 +130,7 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
         begins += piece.time[first[first >= goes_on]].tolist()
         resting += int(np.sum(still))
         if command is not None:
-            disobeyed += int(np.sum(still & (np.abs(_commanded_speed(command, piece.time)) > rest)))
+            disobeyed += int(np.sum(still & (np.abs(_commanded_speed(command, piece.time - late)) > rest)))
     if not total:
         return None
     unmet = disobeyed / resting if command is not None and resting else math.nan
@@ -160,6 +162,15 @@ def _staying(piece: Piece, least: float) -> tuple[Mask, float, int]:
 def rest_speed(piece: Piece, least: float) -> float:
     """The speed up to which a joint is at rest, above the noise of its velocity."""
     return max(least, SHAFT.noisy * piece.noise["velocity"])
+
+
+def _delay(source: Source, command: Source | None) -> float:
+    """By how much later than its command a joint moves, s; 0 where its position was not commanded, or the same."""
+    own, sent = source.known("position"), command.known("position") if command else np.zeros(0)
+    if command is None or min(len(own), len(sent)) < SHAFT.fewest_samples or not np.ptp(sent):
+        return 0.0
+    some = slice(None, None, math.ceil(len(own) / CYCLE.compared))
+    return best_fit(source.only("position").time[some], own[some], command.only("position").time, sent).delay
 
 
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:

@@ -61,12 +61,12 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     some = slice(None, None, math.ceil(len(time) / CYCLE.compared))
     time, value = time[some], value[some]
     motion = float(np.std(value)) or math.inf
-    fits = [_searched(time, value, *path) for path in paths]
+    fits = [best_fit(time, value, *path) for path in paths]
     is_held = shows_steps and fits[1].rest < SHAFT.much_better * fits[0].rest
     fit, (stamps, sent) = fits[is_held], paths[is_held]
 
     def with_play(play: float) -> _Fit:
-        return _searched(time, value, stamps, _played(sent, play))
+        return best_fit(time, value, stamps, _played(sent, play))
 
     low, high = 0.0, 2.0 * largest / max(abs(fit.gain), 1.0)
     for _ in range(CYCLE.sections):
@@ -89,7 +89,7 @@ def _played(path: Numbers, play: float) -> Numbers:
     return moved
 
 
-def _searched(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> _Fit:
+def best_fit(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> _Fit:
     """The fit with the delay that leaves less than those about it; where a command repeats, the shortest such."""
     span = CYCLE.longest_delay * np.linspace(-1.0, 1.0, CYCLE.delays)
     fits = [_fit(time, value, stamps, sent, delay) for delay in span.tolist()]
