@@ -39,7 +39,8 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                 numbers |= {"play": (found.play, unit)} if found.play else {}
             if steps:
                 remarks.append(steady_error(steps, "step", unit))
-                numbers["largest steady error"] = (max(step.error for step in steps), unit)
+                known_errors = [step.error for step in steps if math.isfinite(step.error)]
+                numbers |= {"largest steady error": (max(known_errors), unit)} if known_errors else {}
                 known = [step.response for step in steps if math.isfinite(step.response.rise)]
                 if known and found is None:  # a path has a rise of its own
                     overshoot = 100.0 * max(one.overshoot for one in known)

@@ -39,7 +39,7 @@ class ForceStep(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Of the steady force or torque."""
+        """Of the steady force or torque; NaN where it was not steady at the end."""
         return abs(self.response.final - self.commanded)
 
 
@@ -105,8 +105,9 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
 def steady_error(steps: Sequence[ForceStep], what: str, unit: str) -> str:
     """How many steps there are, and the largest error; what was commanded from the beginning is no step."""
     number = sum(not math.isnan(step.before) for step in steps)
-    worst = max(steps, key=lambda step: step.error)
+    worst = max(steps, key=lambda step: np.nan_to_num(step.error, nan=-1.0))
     error = f"the largest steady error is {shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
+    error = "none was steady at its end" if math.isnan(worst.error) else error
     return f"{counted(number, what) if number else 'commanded from the beginning'}; {error}"
 
 

@@ -16,7 +16,7 @@ class StepResponse(NamedTuple):
 
     Attributes
     ----------
-    final : mean of the steady end.
+    final : mean of the steady end; NaN if it still moves one way.
     ripple : half of the range in the steady end.
     rise : from 10 % to 90 % of the way to `final`, s; NaN if it does not get there, or there is no step.
     settling : until the signal stays within the band about `final`, s; infinite if it leaves the band in the
@@ -72,7 +72,7 @@ def step_response(
     else:
         settling = max(_between(time, np.abs(part - 1.0), int(outside[-1]), band), 0.0)
     if not is_steady:
-        return StepResponse(final, ripple, settling=settling)
+        return StepResponse(math.nan, ripple, settling=settling)
     return StepResponse(final, ripple, high - low, settling, max(float(np.max(part)) - 1.0, 0.0))
 
 
