@@ -61,6 +61,8 @@ def test_noise_is_not_averaged_over_so_much_that_a_fast_rise_gets_longer(seed: i
     assert found.rise == pytest.approx(exact.rise, rel=0.06)
     assert found.settling == pytest.approx(exact.settling, rel=0.06)
     assert found.overshoot == pytest.approx(exact.overshoot, abs=0.02)
+    none = step_response(time, noisy - value + 1.0 - np.exp(-10.0 * time), begin=0.0, steady=1.0, band=0.05)
+    assert none.overshoot < 0.005
 
 
 @pytest.mark.parametrize("sd", [0.0, 0.005])

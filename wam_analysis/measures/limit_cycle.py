@@ -191,7 +191,7 @@ def _fold(flat: Numbers, phase: Numbers, phases: int, loud: float) -> _Folded:
     explained, rest = _explained(flat, shape[cell], len(known))
     seen = shape[count > 0.5 * np.mean(count[known])]  # of few samples a mean is noise
     scatter = math.sqrt(min(rest, loud**2) * len(seen) / len(flat))
-    size = float(np.ptp(seen)) - _luck(np.max(seen) - seen, scatter) - _luck(seen - np.min(seen), scatter)
+    size = float(np.ptp(seen)) - luck(np.max(seen) - seen, scatter) - luck(seen - np.min(seen), scatter)
     return _Folded(max(size, 0.0), explained)
 
 
@@ -211,7 +211,7 @@ def _explained(flat: Numbers, fit: Numbers, free: int) -> tuple[float, float]:
     return max(0.0, 1.0 - rest / whole) if whole > 0.0 else 0.0, rest
 
 
-def _luck(below: Numbers, scatter: float) -> float:
+def luck(below: Numbers, scatter: float) -> float:
     """Part of the highest of the phases on a plateau that is due to noise: the expected largest of so many draws."""
     rivals = np.count_nonzero(below <= 4.0 * scatter)
     return scatter * NormalDist().inv_cdf((rivals - 0.375) / (rivals + 0.25)) if rivals > 1 else 0.0

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.measures.limit_cycle import luck
 from wam_analysis.measures.runs import noise, smoothed
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.thresholds import CYCLE, HOLD
@@ -21,7 +22,8 @@ class StepResponse(NamedTuple):
     rise : from 10 % to 90 % of the way to `final`, s; NaN if it does not get there, or there is no step.
     settling : until the signal stays within the band about `final`, s; infinite if it leaves the band in the
         steady end; NaN if there is no step.
-    overshoot : largest excess over `final` as a fraction of the step, 0 if there is none; NaN likewise.
+    overshoot : largest excess over `final` as a fraction of the step, less what noise gives, 0 if there is none; NaN
+        likewise.
     """
 
     final: float
@@ -73,7 +75,9 @@ def step_response(
         settling = max(_between(time, np.abs(part - 1.0), int(outside[-1]), band), 0.0)
     if not is_steady:
         return StepResponse(math.nan, ripple, settling=settling)
-    return StepResponse(final, ripple, high - low, settling, max(float(np.max(part)) - 1.0, 0.0))
+    part = part[: len(part) - width // 2]  # the last means are of fewer samples
+    over = float(np.max(part)) - 1.0 - luck(np.max(part) - part, sd / math.sqrt(2 * (width // 2) + 1))
+    return StepResponse(final, ripple, high - low, settling, max(over, 0.0))
 
 
 def _end(tail: Numbers, begin: float, band: float) -> tuple[Numbers, bool]:
