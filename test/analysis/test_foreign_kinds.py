@@ -532,6 +532,9 @@ def contradictions() -> list[Case]:
     seen = one("/js", 100.0, 0.1, 0.05, lambda q: q + 2e-3 * np.random.default_rng(2).normal(size=len(q)))
     ends = joints("/js", np.arange(60.0), ["a"], position=np.arange(60)[:, None] % 2, effort=np.ones((60, 1)))
     both += [Case("from end to end in each message", ros1, ends, {"/js: period": 1e3})]
+    slow = [s._replace(fields=s.fields | {"velocity": 0.024 * np.rint(s.fields["velocity"] / 0.024)})
+            for s in one("/js", 100.0, 0.1, 0.05)]  # fmt: skip
+    both += [Case("a coarse velocity", sqlite, slow, {})]
     both += [Case("slow for its noise", by_rosbags, seen, {}), Case("pulses of an encoder", sqlite, pulses, {})]
     both += [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), *(scaled(*each) for each in scales)]
     return [*both, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0),

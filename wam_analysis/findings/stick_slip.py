@@ -12,7 +12,7 @@ from wam_analysis.findings.topics import in_words
 from wam_analysis.foreign.pieces import Piece, pieces, resolution, rests, ways
 from wam_analysis.foreign.source import Source
 from wam_analysis.measures.following import best_fit
-from wam_analysis.measures.runs import at_rest, runs, stays, without_turns
+from wam_analysis.measures.runs import at_rest, count, runs, stays, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, LAYOUT, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
@@ -216,7 +216,8 @@ def _lost_way(piece: Piece, unit: str) -> str:
     usual = STREAM.zero * np.median(left[far >= np.median(far)])
     excess = left - np.minimum(SHAFT.agree * far, np.maximum(SHAFT.late * far, usual))
     noise = piece.noise["position"] + piece.noise["velocity"] * period * math.sqrt(width)
-    allowed = SHAFT.joint_rest * SHAFT.way + max(lag, period) * change
+    rounded = 0.5 * count(piece.recorded["velocity"])  # all the time the same way, as of a slow motion
+    allowed = (SHAFT.joint_rest + rounded) * SHAFT.way + max(lag, period) * change
     excess -= allowed + SHAFT.noisy * noise
     if 2 * np.sum(excess > 0.0) < width:
         return ""
