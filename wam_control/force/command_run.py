@@ -150,7 +150,7 @@ class CommandRun:
 
     Parameters
     ----------
-    key : what makes a command the same as before.
+    key : what makes a command the same as before: its type, its feedback, its frame, and the axes of a task.
     task : what is commanded; None for a posture alone.
     arm : the arm as the controller knows it.
     timing : of the loops.
@@ -185,7 +185,7 @@ class CommandRun:
         still_sd: Array,
         is_moving: bool,
     ) -> None:
-        self.key, self.frame = key, task.frame if task else BASE
+        self.key = key
         self.axes = [AxisRun(axis, arm.covers, timing.dither_cycle > 0) for axis in (task.axes if task else ())]
         self.held_at: Array | None = None
         self.shaking, self.resting, self._is_decided = Shaking(timing), resting, not resting.any()
@@ -197,6 +197,11 @@ class CommandRun:
         self.motions = defaultdict[int, MotionWatch](MotionWatch)
         self.friction = LowPass()
         self.search: Search | None = None
+
+    @property
+    def frame(self) -> str:
+        """In which it is commanded."""
+        return str(self.key[2]) if self.key else BASE
 
     def go_on(self, before: "CommandRun", is_touched: bool) -> None:
         """Of axes that were commanded before, keep where they touch and hold, and with what they press.

@@ -153,7 +153,7 @@ class ForceLoop:
         """Take the present external torques as zero; '' or why they are not those of a free arm."""
         if self._run.axes:
             return "a force is commanded: end the command, and free the arm"
-        if self._measurement.speed >= MOTION.at_rest:
+        if self._measurement.rest.speed >= MOTION.at_rest:
             # the mean speed of an arm that has stopped is that of an arm at rest after this time
             fastest = max(self._body.arm.joints.speed_limit)
             seconds = math.ceil(10.0 * FORCE.steady_time * math.log(fastest / MOTION.at_rest)) / 10.0
@@ -192,7 +192,7 @@ class ForceLoop:
         task, key = _task(admitted.force, given.task, own)
         run, is_free = self._run, given.contact is not None and not contact.cover
         waits = run.is_moving or (run.may_zero and is_free and run.held_at is not None)
-        if key != run.key or (waits and self._measurement.rested > FORCE.friction_turn):
+        if key != run.key or (waits and self._measurement.rest.time > FORCE.friction_turn):
             self._begin(task, key, given.contact)
         self._find_axes(task, contact)
         if own.mode == "open_loop" and given.task is None:
@@ -236,11 +236,11 @@ class ForceLoop:
         before, still_sd, resting = self._run, measurement.torques.sd, np.zeros(len(self._velocity))
         is_zeroed, may_zero = task is not None and bool(limit), False
         if is_zeroed and self._has_left:
-            may_zero = contact is None or bool(contact.cover) or measurement.speed >= MOTION.at_rest
+            may_zero = contact is None or bool(contact.cover) or measurement.rest.speed >= MOTION.at_rest
             if not may_zero:
                 measurement.zero(limit)
             resting = measurement.before
-        is_moving = is_zeroed and measurement.speed > FORCE.slow
+        is_moving = is_zeroed and measurement.rest.speed > FORCE.slow
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
         self._run.may_zero = may_zero
         self._run.go_on(before, contact is not None and bool(contact.cover))

@@ -13,6 +13,7 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.rigid_body import Array, RigidBody
+from wam_description.signals import State
 
 
 class LowPass:
@@ -32,6 +33,31 @@ class LowPass:
         each = zip(self.value or value, value, strict=True)
         self.value = [before + (now - before) * share for before, now in each]
         return self.value
+
+
+class Rest:
+    """Whether the arm rests: it is slow, and its torques are steady.
+
+    Attributes
+    ----------
+    time : for which it has, s.
+    speed : mean speed of the fastest joint, rad/s; infinite where it is not known yet.
+    torques : of the world on the joints (n,), N m, filtered for long.
+    """
+
+    def __init__(self) -> None:
+        self.time, self.speed, self.torques = 0.0, math.inf, np.zeros(0)
+        self._speeds, self._slow, self._slower = LowPass(), LowPass(), LowPass()
+
+    def step(self, torque: Array, joints: State, torque_sd: Array, dt: float) -> None:
+        """Take the torques (n,), N m, of one period, and the standard deviation of each."""
+        self.speed = max(map(abs, self._speeds.step(joints.velocity, FORCE.steady_time, dt)))
+        self.torques = np.array(self._slow.step(torque.tolist(), FORCE.steady_time, dt))
+        lasting = np.array(self._slower.step(self._slow.value, FORCE.friction_turn, dt))
+        is_steady = bool(np.all(np.abs(self.torques - lasting) < FORCE.certain * torque_sd))
+        # brakes hold what is not measured
+        rests = self.speed < MOTION.at_rest and is_steady and any(joints.effort)
+        self.time = self.time + dt if rests else 0.0
 
 
 class Zero(NamedTuple):
@@ -58,8 +84,7 @@ class ForceMeasurement:
     ----------
     torques : of the world on the joints, filtered.
     free : torques of the world on the joints (n,), N m, that counted as those of a free arm when they were taken.
-    rested : time for which the arm has been at rest, with steady torques, s.
-    speed : mean speed of the fastest joint, rad/s; infinite where it is not known yet.
+    rest : whether the arm rests.
     """
 
     def __init__(self, body: RigidBody) -> None:
@@ -68,16 +93,14 @@ class ForceMeasurement:
         self._tare = self._zero = Zero(0.0, none)
         self._q: Sequence[float] = ()
         self._velocity = list[float]()
-        self._slow, self._slower, self._speed, self._acceleration = (LowPass() for _ in range(4))
-        self._steady = none  # torques of the world on the joints, filtered for long
-        self.rested, self.speed = 0.0, math.inf
+        self.rest, self._acceleration = Rest(), LowPass()
         self.torques = WorldTorques(none, none, None, none)
         self.restart()
 
     def restart(self, torques: Sequence[float] = ()) -> None:
         """Forget the filtered torques and the load, or go on from other torques (n,), N m."""
         self._filter = LowPass(torques)
-        self._before = self._taken(self._steady) if len(torques) else Zero(0.0, self._none)
+        self._before = self._taken(self.rest.torques) if len(torques) else Zero(0.0, self._none)
         self.torques = self.torques._replace(now=self._none, before=self._none, acceleration=None)
 
     def step(self, own: ForceLoopParameters, given: ForceInput, is_pressing: bool) -> None:
@@ -93,13 +116,7 @@ class ForceMeasurement:
         is_touched = is_pressing or bool(given.contact and given.contact.cover)
         dt, torque = given.dt, self._torque(own, given)
         self._q, self._torque_sd = given.joints.position, self._none + own.sensing_fed_back.torque_sd
-        self.speed = max(map(abs, self._speed.step(given.joints.velocity, FORCE.steady_time, dt)))
-        self._steady = np.array(self._slow.step(torque.tolist(), FORCE.steady_time, dt))
-        lasting = np.array(self._slower.step(self._slow.value, FORCE.friction_turn, dt))
-        is_steady = bool(np.all(np.abs(self._steady - lasting) < FORCE.certain * self._torque_sd))
-        # brakes hold what is not measured
-        rests = self.speed < MOTION.at_rest and is_steady and any(given.joints.effort)
-        self.rested = self.rested + dt if rests else 0.0
+        self.rest.step(torque, given.joints, self._torque_sd, dt)
         is_first = not self._filter.value
         counted = torque - self._zeros if is_touched or not own.is_estimated else self._none
         now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
@@ -111,8 +128,8 @@ class ForceMeasurement:
         stated = given.external_sd if own.is_estimated else None
         sd = np.maximum(stated, FORCE.least_sd) if stated else self._torque_sd
         self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
-        if self.rested > FORCE.steady_time and not is_pressing:
-            seen = self._taken(self._steady)
+        if self.rest.time > FORCE.steady_time and not is_pressing:
+            seen = self._taken(self.rest.torques)
             self._before = seen if seen.mass or not is_touched else self._before
 
     @property
@@ -143,14 +160,14 @@ class ForceMeasurement:
 
     def tare(self) -> None:
         """Take the steady external torques as zero."""
-        self._tare = self._taken(self._steady - self._zero.at(self._body, self._q))
+        self._tare = self._taken(self.rest.torques - self._zero.at(self._body, self._q))
         self.free = self._zeros
         self.restart(self.resting.tolist())
 
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
-        return self._steady - self._zeros
+        return self.rest.torques - self._zeros
 
     @property
     def before(self) -> Array:
@@ -158,13 +175,13 @@ class ForceMeasurement:
 
         Without a load they are those of now, if it rests now.
         """
-        if self.speed < MOTION.at_rest and not self._before.mass:
+        if self.rest.speed < MOTION.at_rest and not self._before.mass:
             return self.resting
         return self._before.at(self._body, self._q) - self._zeros
 
     def zero(self, limit: float) -> None:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m."""
-        found = self._steady - self._tare.at(self._body, self._q)
+        found = self.rest.torques - self._tare.at(self._body, self._q)
         if float(np.abs(found).max()) <= limit:
             self._zero = self._taken(found)
             self.free = self._zeros
