@@ -271,7 +271,7 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
         position, velocity, effort, acceleration = values
         each = ((position, velocity, acceleration), (velocity, acceleration), (effort,), (acceleration,))
         stop = np.array([min(end, last)], np.int64)
-        # one of which no beginning is known, and that is replaced before its first point, stands there
+        # one of which no beginning is known, and that is replaced before its first point, is at rest there
         held = {names: [_spline(np.maximum(stop, knots[0]), np.array(knots), *one) for one in each]}
         if not len(at):  # it was replaced before its first point
             continue
