@@ -6,7 +6,7 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.force import SWINGS_ON, fate_words
-from wam_analysis.findings.force_steps import force_steps, steady_error
+from wam_analysis.findings.force_steps import force_steps, steady_error, worst
 from wam_analysis.findings.repetition import LEAST
 from wam_analysis.foreign.pieces import resolution, rests
 from wam_analysis.foreign.source import AXES, Source
@@ -39,8 +39,8 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                 numbers |= {"play": (found.play, unit)} if found.play else {}
             if steps:
                 remarks.append(steady_error(steps, "step", unit))
-                known_errors = [step.error for step in steps if math.isfinite(step.error)]
-                numbers |= {"largest steady error": (max(known_errors), unit)} if known_errors else {}
+                error = worst(steps).error
+                numbers |= {"largest steady error": (error, unit)} if math.isfinite(error) else {}
                 known = [step.response for step in steps if math.isfinite(step.response.rise)]
                 if known and found is None:  # a path has a rise of its own
                     overshoot = 100.0 * max(one.overshoot for one in known)

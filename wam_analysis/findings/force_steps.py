@@ -102,12 +102,16 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     return found
 
 
+def worst(steps: Sequence[ForceStep]) -> ForceStep:
+    """The step with the largest steady error, which is NaN where none was steady at its end."""
+    return max(steps, key=lambda step: np.nan_to_num(step.error, nan=-1.0))
+
+
 def steady_error(steps: Sequence[ForceStep], what: str, unit: str) -> str:
     """How many steps there are, and the largest error; what was commanded from the beginning is no step."""
-    number = sum(not math.isnan(step.before) for step in steps)
-    worst = max(steps, key=lambda step: np.nan_to_num(step.error, nan=-1.0))
-    error = f"the largest steady error is {shown(worst.error, unit)} of {shown(worst.commanded, unit)}"
-    error = "none was steady at its end" if math.isnan(worst.error) else error
+    number, most = sum(not math.isnan(step.before) for step in steps), worst(steps)
+    error = f"the largest steady error is {shown(most.error, unit)} of {shown(most.commanded, unit)}"
+    error = "none was steady at its end" if math.isnan(most.error) else error
     return f"{counted(number, what) if number else 'commanded from the beginning'}; {error}"
 
 

@@ -61,9 +61,10 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                 alike[origin].append(name + changes)
                 frequency = 1.0 / cycle.period
                 if origin in (LIMIT_CYCLE, UNKNOWN):
-                    at = "" if cycle.alternates else shown(frequency, "Hz")
-                    how = f"repeats at {at}, {{}} peak to peak" if at else "alternates from message to message, by {}"
-                    text = f"{name} {how.format(shown(cycle.peak_to_peak, unit))}"
+                    at, wide = shown(frequency, "Hz"), shown(cycle.peak_to_peak, unit)
+                    text = f"{name} repeats at {at}, {wide} peak to peak"
+                    if cycle.alternates:
+                        at, text = "", f"{name} alternates from message to message, by {wide}"
                     text += changes + ", not commanded" * (origin == LIMIT_CYCLE)
                     cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text, label))
                 size = "from message to message" if cycle.alternates else "cycle, peak to peak"

@@ -240,16 +240,14 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
 def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
     """The paths of trajectories, each until the next one begins.
 
-    Each begins where the one before is at that instant.  They are
-    straight between the points, cubic where these have velocities, and of the fifth degree where they have
-    accelerations, too, as ros2_control interpolates them.
+    Each begins where the one before is at that instant.  They are straight between the points, cubic where these have
+    velocities, and of the fifth degree where they have accelerations, too, as ros2_control interpolates them.
     """
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
     groups, times, held = list[Any](), [np.zeros(0, np.int64)], dict[tuple[str, ...], list[Numbers]]()
     wrong, (frame, *_) = 0, _frames(columns)
-    ends = [*begins.tolist()[1:], math.inf]
-    for message, begin, end in zip(columns.messages, begins.tolist(), ends, strict=True):
+    for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
         points, names = getattr(message, "points", ()), tuple(map(str, getattr(message, "joint_names", ())))
         if not points:
             held = {}  # it cancels
@@ -270,12 +268,10 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
         at = at[at < end]
         position, velocity, effort, acceleration = values
         each = ((position, velocity, acceleration), (velocity, acceleration), (effort,), (acceleration,))
-        stop = np.array([min(end, last)], np.int64)
         # one of which no beginning is known, and that is replaced before its first point, is at rest there
-        held = {names: [_spline(np.maximum(stop, knots[0]), np.array(knots), *one) for one in each]}
-        if not len(at):  # it was replaced before its first point
-            continue
-        taken = [_spline(at, np.array(knots), *one) for one in each]
+        stop = np.array([max(last, knots[0])], np.int64)
+        taken, left = ([_spline(when, np.array(knots), *one) for one in each] for when in (at, stop))
+        held = {names: left}
         groups.append((np.arange(len(at)) + sum(map(len, times)), (at, frame, names, taken[:3])))
         times.append(at)
     found = joint_columns(np.concatenate(times), groups)

@@ -98,8 +98,8 @@ def alternates(source: Source) -> bool:
         finest = smallest(twice, float(np.ptp(here)))
         coarse = max(float(np.median(twice)), finest if finest < math.inf else 0.0)
         away = once > STREAM.zero * np.maximum(twice, coarse)
-        waits = np.sort([np.diff(one.time)[:-1], np.diff(one.time)[1:]], axis=0)
-        is_more = waits[0] < (1.0 - STREAM.pace) * np.median(waits[1])
+        shorter, longer = np.sort(sliding_window_view(np.diff(one.time), 2), axis=1).T
+        is_more = shorter < (1.0 - STREAM.pace) * np.median(longer)
         if np.mean(away & is_more) > max(STREAM.repeated, np.mean(away)) / 2.0:
             return True
     return False

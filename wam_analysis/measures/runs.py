@@ -21,12 +21,6 @@ def after_gaps(time: Numbers | Rows) -> Mask:
     return np.concatenate([np.zeros(min(1, len(time)), np.bool_), late])
 
 
-def usual_step(steps: Numbers) -> float:
-    """The step that most of the time is made of: messages that come in packets have many that are short."""
-    steps = np.sort(steps)
-    return float(steps[np.searchsorted(np.cumsum(steps), 0.5 * np.sum(steps))])
-
-
 def usual_steps(steps: Numbers) -> Numbers:
     """The usual step about each, (n,): that of all, or of the steps about it where these are even, as at another rate.
 

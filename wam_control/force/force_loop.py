@@ -193,7 +193,7 @@ class ForceLoop:
         run, is_free = self._run, given.contact is not None and not contact.cover
         waits = run.is_moving or (run.may_zero and is_free and run.held_at is not None)
         if key != run.key or (waits and self._measurement.rest.time > FORCE.friction_turn):
-            self._begin(task, key, given.contact)
+            self._begin(task, key, is_free, bool(contact.cover))
         self._find_axes(task, contact)
         if own.mode == "open_loop" and given.task is None:
             effort = sum((one.now.along * one.now.desired for one in self._run.axes), np.zeros(len(pose)))
@@ -230,20 +230,22 @@ class ForceLoop:
         self._velocity = np.zeros(len(self._pose))
         self._begin(None, ())
 
-    def _begin(self, task: TaskCommand | None, key: tuple[object, ...], contact: Contact | None = None) -> None:
+    def _begin(
+        self, task: TaskCommand | None, key: tuple[object, ...], is_free: bool = False, is_touched: bool = False
+    ) -> None:
         """Something else is commanded: what a free arm at rest measures is the error of its model."""
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
         before, still_sd, resting = self._run, measurement.torques.sd, np.zeros(len(self._velocity))
-        is_zeroed, may_zero = task is not None and bool(limit), False
-        if is_zeroed and self._has_left:
-            may_zero = contact is None or bool(contact.cover) or measurement.rest.speed >= MOTION.at_rest
-            if not may_zero:
+        is_zeroed, rests = task is not None and bool(limit), is_free and measurement.rest.speed < MOTION.at_rest
+        has_left = is_zeroed and self._has_left
+        if has_left:
+            if rests:
                 measurement.zero(limit)
             resting = measurement.before
         is_moving = is_zeroed and measurement.rest.speed > FORCE.slow
         self._run = CommandRun(key, task, self._body.arm, self._timing, self._pose, resting, still_sd, is_moving)
-        self._run.may_zero = may_zero
-        self._run.go_on(before, contact is not None and bool(contact.cover))
+        self._run.may_zero = has_left and not rests
+        self._run.go_on(before, is_touched)
         self._moved = np.zeros(len(self._pose))
         if self.supervision.watch is not None:
             self.supervision.watch.restart()

@@ -53,11 +53,11 @@ class Rest:
         """Take the torques (n,), N m, of one period, and the standard deviation of each."""
         self.speed = max(map(abs, self._speeds.step(joints.velocity, FORCE.steady_time, dt)))
         self.torques = np.array(self._slow.step(torque.tolist(), FORCE.steady_time, dt))
-        lasting = np.array(self._slower.step(self._slow.value, FORCE.friction_turn, dt))
-        is_steady = bool(np.all(np.abs(self.torques - lasting) < FORCE.certain * torque_sd))
+        lasting = self._slower.step(self._slow.value, FORCE.friction_turn, dt)
         # brakes hold what is not measured
-        rests = self.speed < MOTION.at_rest and is_steady and any(joints.effort)
-        self.time = self.time + dt if rests else 0.0
+        rests = self.speed < MOTION.at_rest and any(joints.effort)
+        is_steady = rests and bool(np.all(np.abs(self.torques - lasting) < FORCE.certain * torque_sd))
+        self.time = self.time + dt if is_steady else 0.0
 
 
 class Zero(NamedTuple):
