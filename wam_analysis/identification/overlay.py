@@ -8,41 +8,33 @@ import numpy as np
 import yaml
 
 from wam_analysis.identification.fit import Identification
-from wam_analysis.identification.unknowns import AXES, DIRECTIONS, Unknowns
+from wam_analysis.identification.unknowns import DIRECTIONS, OF_LINK, Unknowns
 from wam_analysis.thresholds import IDENTIFY, LAYOUT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Shared
-from wam_description.configuration import GIVEN, PARAMETERS, SHARED, Configuration
-from wam_description.parameters import ParameterError
+from wam_description.configuration import BASE, PARAMETERS, SHARED, Configuration, shaped_like
+from wam_description.parameters import ParameterError, nested
 
 HEADING = "# The controllers' model as identified"  # of the file
 DEVIATIONS = ("observer.mass_scale", "observer.friction_scale")
 
 
 class Identified(NamedTuple):
-    """Parameters as the model has them: of friction towards zero speed F_s instead of F_s - F_c.
+    """Parameters as the model has them: of friction towards zero speed F_s instead of F_s - F_c; (p,) each."""
 
-    Attributes
-    ----------
-    names : p.
-    present, values, sd : (p,).
-    """
-
-    names: tuple[str, ...]
-    present: Numbers
     values: Numbers
     sd: Numbers
+    present: Numbers
 
 
 def identified(found: Identification) -> Identified:
     """The result in the parameters of the model."""
-    names = found.unknowns.names
-    mixing = np.eye(len(names))
+    mixing = np.eye(len(found.values))
     for way in DIRECTIONS:
         rows, columns = (found.unknowns.places(f"motors.{what}_{way}") for what in ("static", "coulomb"))
         mixing[rows, columns] = 1.0
     sd = np.sqrt((mixing @ found.covariance @ mixing.T).diagonal())
-    return Identified(names, mixing @ found.unknowns.present, mixing @ found.values, sd)
+    return Identified(mixing @ found.values, sd, mixing @ found.unknowns.present)
 
 
 def model_values(shared: Shared, found: Identification, source: str) -> dict[str, Any]:
@@ -52,28 +44,25 @@ def model_values(shared: Shared, found: Identification, source: str) -> dict[str
     ----------
     source : the recording.
     """
-    result = identified(found)
-    every = dict.fromkeys(name.rpartition(".")[0] for name in result.names)
-    groups = {group: result.values[found.unknowns.places(group)] for group in every}
-    values: dict[str, Any] = {"model.source": source}
-    for group, each in groups.items():
-        if group.startswith("motors.") and group != "motors.torque_difference":
-            values[f"model.{group}"] = _numbers(each)
-    values |= _joint_values(shared, found.unknowns, groups)
-    values |= _link_values(groups)
-    values["model.covariance.parameters"] = list(found.tracked.names)
-    values["model.covariance.values"] = _numbers(found.tracked.covariance.ravel())
-    return values
+    result, unknowns = identified(found).values, found.unknowns
+    groups = (name.rpartition(".")[0] for name in unknowns.names if name.startswith("motors."))
+    model = {group: result[unknowns.places(group)] for group in dict.fromkeys(groups)}
+    model.pop("motors.torque_difference", None)  # the controllers' model has none
+    model |= _joint_friction(shared, unknowns, result)
+    values = {f"model.{name}": _numbers(each) for name, each in model.items()}
+    values |= {f"model.links.{name}": _numbers(each, 9) for name, each in _links(unknowns, result).items()}
+    return {
+        "model.source": source,
+        **values,
+        "model.covariance.parameters": list(found.tracked.names),
+        "model.covariance.values": _numbers(found.tracked.covariance.ravel()),
+    }
 
 
 def estimator_values(configuration: Configuration) -> dict[str, Any]:
     """Values of the contact estimator, by 'node:name', that switch off its own deviations from the model."""
     own = configuration.sections.get("contact_estimator", {})
-    neutral = {name: own[name] for name in DEVIATIONS if name in own}
-    return {
-        f"contact_estimator:{name}": [1.0] * len(value) if isinstance(value, list) else 1.0
-        for name, value in neutral.items()
-    }
+    return {f"contact_estimator:{name}": shaped_like(own[name], 1.0) for name in DEVIATIONS if name in own}
 
 
 def impossibility(configuration: Configuration, values: Mapping[str, Any], source: str) -> str:
@@ -87,8 +76,7 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     try:
         _ = configuration.with_values(values).shared.model_arm
     except ParameterError as error:
-        where = f", section '{SHARED}': "
-        reason = str(error).removeprefix(GIVEN + where).removeprefix(f"{configuration.path}{where}")
+        reason = str(error).rpartition(f"section '{SHARED}': ")[2]  # who reads it has set no value
         return (
             f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "
             "touched the arm, or it moved too little: identify from a recording without contact, such as "
@@ -97,24 +85,20 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     return ""
 
 
-def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Numbers]) -> dict[str, Any]:
+def _joint_friction(shared: Shared, unknowns: Unknowns, result: Numbers) -> dict[str, Numbers]:
     """Friction of the joints: none at joints whose motor has it."""
-    model = shared.model.joints
-    found: dict[str, Numbers] = {}
-    for name in ("coulomb", "load", "viscous"):
-        found[name] = np.zeros(len(model.coulomb))
-        found[name][list(unknowns.joints)] = groups.get(f"joints.{name}", np.zeros(0))
-    drop = np.subtract(model.static, model.coulomb)
-    found["static"] = found["coulomb"] + np.where(np.isin(np.arange(len(drop)), unknowns.joints), drop, 0.0)
-    return {f"model.joints.{name}": _numbers(each) for name, each in found.items()}
+    model, chosen = shared.model.joints, list(unknowns.joints)
+    friction = {name: result[unknowns.places(f"joints.{name}")] for name in ("coulomb", "load", "viscous")}
+    friction["static"] = friction["coulomb"] + np.subtract(model.static, model.coulomb)[chosen]
+    every = np.zeros((len(friction), len(model.coulomb)))
+    every[:, chosen] = list(friction.values())
+    return {f"joints.{name}": each for name, each in zip(friction, every, strict=True)}
 
 
-def _link_values(groups: Mapping[str, Numbers]) -> dict[str, Any]:
-    mass = groups["links.mass"]
-    centre = np.column_stack([groups[f"links.moment_{axis}"] / mass for axis in AXES])
-    inertia = np.maximum(np.column_stack([groups[f"links.inertia_{axis}"] for axis in AXES]), IDENTIFY.least_inertia)
-    named = {"mass": mass, "centre": centre.ravel(), "inertia": inertia.ravel()}
-    return {f"model.links.{name}": _numbers(each, 9) for name, each in named.items()}
+def _links(unknowns: Unknowns, result: Numbers) -> dict[str, Numbers]:
+    mass, *others = (result[unknowns.places(f"links.{name}")] for name in OF_LINK)
+    centre, inertia = np.array(others[:3]) / mass, np.maximum(others[3:], IDENTIFY.least_inertia)
+    return {"mass": mass, "centre": centre.T.ravel(), "inertia": inertia.T.ravel()}
 
 
 def _numbers(values: Numbers, digits: int = LAYOUT.digits) -> list[float]:
@@ -130,13 +114,10 @@ def write_overlay(file: Path, base: str, values: Mapping[str, Any], command: str
     values : by dotted name of a shared parameter, or 'node:name'.
     command : that made them.
     """
-    tree: dict[str, Any] = {"base": base}
+    flat: dict[str, Any] = {BASE: base}
     for key, value in values.items():
         node, _, name = key.rpartition(":")
-        *path, leaf = name.split(".")
-        branch = tree
-        for part in (f"{SHARED}/{node}" if node else SHARED, PARAMETERS, *path):
-            branch = branch.setdefault(part, {})
-        branch[leaf] = value
-    body = yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=120)
+        section = f"{SHARED}/{node}" if node else SHARED
+        flat[f"{section}.{PARAMETERS}.{name}"] = value
+    body = yaml.safe_dump(nested(flat), sort_keys=False, default_flow_style=None, width=120)
     file.write_text(f"{HEADING}: {command}\n{body}", encoding="utf-8")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.unknowns import AXES, DIRECTIONS, Unknowns
+from wam_analysis.identification.unknowns import DIRECTIONS, OF_LINK, Unknowns
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
@@ -182,8 +182,7 @@ class Regressor:
         """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""
         unknowns, links = self.unknowns, self._shared.arm.links
         n = len(links.names)
-        groups = ["mass", *(f"moment_{axis}" for axis in AXES), *(f"inertia_{axis}" for axis in AXES)]
-        at = np.array([unknowns.places(f"links.{group}") for group in groups])  # (7, n)
+        at = np.array([unknowns.places(f"links.{name}") for name in OF_LINK])  # (7, n)
         jacobian, constant = np.zeros((10 * n, 7 * n)), np.zeros(10 * n)
         for i in range(n):
             link, product = values[at[:, i]], links.product[3 * i : 3 * i + 3]

@@ -38,11 +38,11 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     result = identified(found)
     rows = []
     is_identified, is_combined = found.is_identified, found.is_combined  # each of them computes the covariance
-    for i, name in enumerate(result.names):
+    for i, name in enumerate(found.unknowns.names):
         unit = UNITS[name.split(".")[1].partition("_")[0]]
         state = "yes" if is_identified[i] else "in combination" if is_combined[i] else "no"
         state = BY_SHAPE if state == "yes" and name.startswith(CURVE) else state
-        cells = [f"{value:.4g}" for value in (result.values[i], result.sd[i], result.present[i])]
+        cells = [f"{each[i]:.4g}" for each in result]
         rows.append([name, *cells, unit, state])
     offset, offset_sd = found.offset_if_alike
     for i, name in enumerate(shared.arm.motors.names):
@@ -50,7 +50,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
         rows.append([f"motors.torque_offset.{name}", *numbers, "N m", "not from this recording"])
     head = [["parameter", "value", "standard error", "present value", "unit", "identifiable"]]
     lines = [f"{label}: model of the arm from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
-    parts = (found.before, found.residual, found.held_out)
+    parts = (found.before, found.residual, found.held_out, found.tracked.left)
     lines += plain(
         [
             [
@@ -63,7 +63,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
             ]
         ],
         [
-            [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in (*parts, found.tracked.left))]
+            [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in parts)]
             for i, name in enumerate(shared.arm.motors.names)
         ],
     )

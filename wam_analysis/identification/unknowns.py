@@ -19,6 +19,7 @@ from wam_description.rigid_body import RigidBody
 
 DIRECTIONS = ("positive", "negative")
 AXES = ("x", "y", "z")
+OF_LINK = ("mass", *(f"{what}_{axis}" for what in ("moment", "inertia") for axis in AXES))
 # standard deviations of the prior, which decides only what the motion does not show
 
 
@@ -100,14 +101,11 @@ def unknowns(shared: Shared) -> Unknowns:
     add("joints.coulomb", chosen, coulomb, IDENTIFY.friction * coulomb)
     add("joints.load", chosen, load, IDENTIFY.load)
     add("joints.viscous", chosen, viscous, IDENTIFY.viscous * viscous)
-    mass, n = np.array(links.mass), len(links.mass)
-    centre, inertia = np.reshape(links.centre, (n, 3)), np.reshape(links.inertia, (n, 3))
-    of_links = list(arm.links.names)
-    add("links.mass", of_links, mass, IDENTIFY.mass * mass)
-    for i, axis in enumerate(AXES):
-        add(f"links.moment_{axis}", of_links, mass * centre[:, i], IDENTIFY.centre * mass)
-    for i, axis in enumerate(AXES):
-        add(f"links.inertia_{axis}", of_links, inertia[:, i], IDENTIFY.inertia * inertia[:, i])
+    mass = np.array(links.mass)
+    centres, inertias = (np.reshape(each, (len(mass), 3)).T for each in (links.centre, links.inertia))
+    sds = [IDENTIFY.mass * mass, *[IDENTIFY.centre * mass] * 3, *(IDENTIFY.inertia * inertias)]
+    for name, each, deviation in zip(OF_LINK, [mass, *(mass * centres), *inertias], sds, strict=True):
+        add(f"links.{name}", list(arm.links.names), each, deviation)
     kept = np.zeros((len(names), len(names)))
     return Unknowns(tuple(names), np.array(present), np.array(sd), joints, tuple(sharing), kept)
 
@@ -117,9 +115,9 @@ def with_kept_weight(sought: Unknowns, shared: Shared, still: Sequence[int]) -> 
     arm, rest = shared.arm, np.zeros(shared.arm.n)
     random = np.random.Generator(np.random.PCG64(IDENTIFY.seed))
     poses = random.uniform(arm.joints.lower, arm.joints.upper, (IDENTIFY.poses, len(rest)))
-    body, groups = RigidBody(arm), ("links.mass", *(f"links.moment_{axis}" for axis in AXES))
+    body = RigidBody(arm)
     rows = np.zeros((len(poses) * len(still), len(sought.names)))
     torques = np.concatenate([body.inverse_dynamics_regressor(q, rest, rest)[list(still)] for q in poses])
-    for i, group in enumerate(groups):
-        rows[:, sought.places(group)] = torques[:, i::10]
+    for i, name in enumerate(OF_LINK[:4]):  # that have weight
+        rows[:, sought.places(f"links.{name}")] = torques[:, i::10]
     return sought._replace(kept=rows.T @ rows / IDENTIFY.kept_weight**2)
