@@ -1,6 +1,7 @@
 """The parameters in a bag, read with care."""
 
 import hashlib
+from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -92,7 +93,7 @@ class RecordedParameters(NamedTuple):
         ParameterError
             if no node in the bag has such a parameter, or a value is not allowed.
         """
-        settings: dict[str, Any] = {}
+        nodes = {node: dict(flat) for node, flat in self.nodes.items()}
         for key, value in values.items():
             node, colon, name = key.rpartition(":")
             owners = [own for own, flat in self.nodes.items() if name in flat and (own == node or not colon)]
@@ -100,13 +101,13 @@ class RecordedParameters(NamedTuple):
             known = [f"{own}{colon}{one}" if colon else one for own, flat in self.nodes.items() for one in flat]
             reason = f"{who} parameter '{name}' in {self.source}; {meant(key, known)}write [node:]parameter=value"
             require(bool(owners), f"--set {key}: {reason}")
-            settings |= {f"{own}:{name}": shaped_like(self.nodes[own][name], value) for own in owners}
-        changed = self.with_values(settings)
-        for node in {key.partition(":")[0] for key in settings} & NODES.keys():
+            for own in owners:
+                nodes[own][name] = shaped_like(nodes[own][name], value)
+        for node in nodes.keys() & NODES.keys():
             for cls in (Shared, declared(node).parameter_class):
-                why = _refusal(cls, changed.nodes[node])  # values of another version are refused where they are used
+                why = _refusal(cls, nodes[node])  # values of another version are refused where they are used
                 require(not why or bool(_refusal(cls, self.nodes[node])), f"--set: {why}")
-        return changed
+        return self._replace(nodes=nodes)
 
     @property
     def shared(self) -> Shared:
@@ -141,12 +142,7 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
             problem = f"{ATTACHMENT} in the bag has no parameters of the arm {namespace}; it has those of {there}"
     except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
         problem = f"{ATTACHMENT} in the bag cannot be read: {' '.join(str(error).split())}"
-    differing = {node: _differences(node, values) for node, values in recorded.items()}
-    words = "misses the parameters", "has the unknown parameters"
-    lists = [_note(word, {node: names[row] for node, names in differing.items()}) for row, word in enumerate(words)]
-    note = " and ".join(text for text in lists if text)
-    notes = (f"the recording {note}: it is of another version, record it again",) if note else ()
-    return RecordedParameters(str(bag.path), recorded, hashlib.sha256(attached).hexdigest(), problem, notes)
+    return RecordedParameters(str(bag.path), recorded, hashlib.sha256(attached).hexdigest(), problem, _notes(recorded))
 
 
 def _refusal(cls: type, values: Values) -> str:
@@ -158,24 +154,26 @@ def _refusal(cls: type, values: Values) -> str:
     return ""
 
 
-def _differences(node: str, recorded: Values) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names that the recorded parameters of a node lack, and those that it does not have; none of a foreign node.
+def _notes(recorded: Mapping[str, Values]) -> tuple[str, ...]:
+    """Which parameters are missing, and which are unknown; one of several nodes is named once, without a node.
 
-    A node that `nodes` does not list has its own class, as the driver of a real arm.
+    Not looked at is a foreign node, or one that `nodes` does not list: it has its own class, as the driver of a real
+    arm.
     """
-    listed = recorded.get("nodes")
-    if node not in NODES or node == "recorder" or (isinstance(listed, list) and node not in listed):
-        return (), ()
-    known = {field.name: field for cls in (Shared, declared(node).parameter_class) for field in fields(cls)}
-    missing = [name for name, field in known.items() if name not in recorded and field.is_required]
-    return tuple(missing), tuple(name for name in recorded if name not in known)
-
-
-def _note(begin: str, names: Mapping[str, tuple[str, ...]]) -> str:
-    """Parameters of some nodes; one of several nodes is named once, without a node."""
-    of: dict[str, list[str]] = {}
-    for node, some in names.items():
-        for name in some:
-            of.setdefault(name, []).append(node)
-    listed = ", ".join(name if len(nodes) > 1 else f"{nodes[0]}:{name}" for name, nodes in of.items())
-    return f"{begin} {listed}" if listed else ""
+    missing, unknown = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
+    for node, values in recorded.items():
+        listed = values.get("nodes")
+        if node not in NODES or node == "recorder" or (isinstance(listed, list) and node not in listed):
+            continue
+        known = {field.name: field for cls in (Shared, declared(node).parameter_class) for field in fields(cls)}
+        for name in [name for name, field in known.items() if field.is_required and name not in values]:
+            missing[name].append(node)
+        for name in [name for name in values if name not in known]:
+            unknown[name].append(node)
+    both = {"misses the parameters": missing, "has the unknown parameters": unknown}
+    texts = [
+        f"{what} {', '.join(name if nodes[1:] else f'{nodes[0]}:{name}' for name, nodes in of.items())}"
+        for what, of in both.items()
+        if of
+    ]
+    return (f"the recording {' and '.join(texts)}: it is of another version, record it again",) * bool(texts)
