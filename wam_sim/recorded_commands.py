@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_bag.arrays import Mask
-from wam_bag.bag import Bag, BagError, JointColumns, TableColumns, WrenchColumns
+from wam_bag.bag import Bag, BagError, Columns, JointColumns, TableColumns, WrenchColumns
 from wam_description.arm import Arm
 from wam_description.signals import BASE
 from wam_description.thresholds import INPUTS
@@ -57,23 +57,19 @@ def several_runs(bag: Bag, namespace: str) -> str:
     namespace : of the arm.
     """
     found = states_of(bag, namespace)
-    if found is not None:
-        topic, stamps = found[0], found[1].stamp_ns
-        ends = [*np.flatnonzero(np.diff(stamps) < -RESET).tolist(), len(stamps) - 1]
-        if len(ends) > 1:
-            begins = [0, *(end + 1 for end in ends[:-1])]
-            spans = zip(stamps[begins].tolist(), stamps[ends].tolist(), strict=True)
-            times = ", ".join(f"{begin / 1e9:.3f} to {end / 1e9:.3f} s" for begin, end in spans)
-            return f"{len(ends)} runs are in this recording: the stamps of {topic} go back ({times})"
-        unique, counts = np.unique(stamps, return_counts=True)
-        again = counts > 1
-        if np.sum(again) >= FEWEST and np.all(np.diff(stamps) >= 0):
-            first, last = unique[again][[0, -1]] / 1e9
-            return (
-                f"{int(np.max(counts))} runs are in this recording: the stamps of {topic} from {first:.3f} to "
-                f"{last:.3f} s come {int(np.max(counts))} times"
-            )
-    return ""
+    if found is None:
+        return ""
+    topic, stamps = found[0], found[1].stamp_ns
+    runs = np.split(stamps, np.flatnonzero(np.diff(stamps) < -RESET) + 1)
+    if len(runs) > 1:
+        times = ", ".join(f"{one[0] / 1e9:.3f} to {one[-1] / 1e9:.3f} s" for one in runs)
+        return f"{len(runs)} runs are in this recording: the stamps of {topic} go back ({times})"
+    unique, counts = np.unique(stamps, return_counts=True)
+    again, most = unique[counts > 1] / 1e9, int(np.max(counts))
+    if len(again) < FEWEST or np.any(np.diff(stamps) < 0):
+        return ""
+    times = f"from {again[0]:.3f} to {again[-1]:.3f} s come {most} times"
+    return f"{most} runs are in this recording: the stamps of {topic} {times}"
 
 
 def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> tuple[Bag, tuple[RefusedCommands, ...]]:
@@ -89,29 +85,29 @@ def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> 
     parameters : of its nodes; without them every frame is taken.
     """
     found, frames = states_of(bag, namespace), _frames(parameters)
-    topics, refused = dict(bag.topics), list[RefusedCommands]()
+    changed, refused = dict[str, Columns](), list[RefusedCommands]()
     for name in COMMANDS:
         topic = f"{namespace}/{name}"
-        columns = topics.get(topic)
-        if not isinstance(columns, (WrenchColumns, TableColumns)) or not len(columns.stamp_ns):
+        columns = bag.topics.get(topic)
+        if not isinstance(columns, (WrenchColumns, TableColumns)):
             continue
-        kept = np.ones(len(columns.stamp_ns), bool)
+        taken, frame = columns, np.array(columns.frames, object)
+        defects = np.full(len(frame), "", object)
+        for other in {*frame} - {*frames} if frames else ():
+            defects[frame == other] = f"the frame '{other}', which is none of {', '.join(frames)}"
         if found is not None:
             last = int(np.max(found[1].stamp_ns)) + INPUTS.longest_jump
-            is_ahead = columns.stamp_ns > last
-            columns = _stamped(columns, found[1], (columns.stamp_ns == 0) | (is_ahead if name == PUSH else False))
-            kept = columns.stamp_ns <= last
-            refused.append(RefusedCommands(name, int(np.sum(~kept)), AHEAD))
-        if frames:
-            unknown = kept & ~np.isin(np.array(columns.frames, np.str_), frames)
-            for frame, count in sorted(Counter(np.array(columns.frames, np.str_)[unknown].tolist()).items()):
-                defect = f"the frame '{frame}', which is none of {', '.join(frames)}"
-                refused.append(RefusedCommands(name, count, defect))
-            kept &= ~unknown
-        topics[topic] = columns if np.all(kept) else _only(columns, kept)
-    changed = any(columns is not bag.topics[topic] for topic, columns in topics.items())
-    taken = bag._replace(topics=type(bag.topics)(topics)) if changed else bag
-    return taken, tuple(one for one in refused if one.number)
+            is_ahead = (columns.stamp_ns > last) & (name == PUSH)
+            taken = _stamped(columns, found[1], (columns.stamp_ns == 0) | is_ahead)
+            defects[taken.stamp_ns > last] = AHEAD
+        counts = Counter(defects.tolist())
+        refused += [RefusedCommands(name, count, defect) for defect, count in sorted(counts.items()) if defect]
+        taken = taken if counts.keys() <= {""} else _only(taken, defects == "")
+        if taken is not columns:
+            changed[topic] = taken
+    if changed:
+        bag = bag._replace(topics=type(bag.topics)({**bag.topics, **changed}))
+    return bag, tuple(refused)
 
 
 def _frames(parameters: RecordedParameters) -> tuple[str, ...]:
@@ -133,10 +129,10 @@ def _stamped(columns: Commands, states: JointColumns, missing: Mask) -> Commands
 
 def _only(columns: Commands, kept: Mask) -> Commands:
     """Some of the messages, (k,)."""
-    named: tuple[str, ...] = columns._fields
+    own: dict[str, Any] = {}
     if isinstance(columns, TableColumns):
-        rows, named = kept[columns.message], ("log_time_ns", "stamp_ns", "frames")
-        values = {name: value[rows] for name, value in columns.columns.items()}
-        columns = columns._replace(message=(np.cumsum(kept) - 1)[columns.message[rows]], columns=values)
-    sliced: dict[str, Any] = {name: np.array(getattr(columns, name))[kept] for name in named}
-    return columns._replace(**sliced)
+        rows = kept[columns.message]
+        own["message"] = (np.cumsum(kept) - 1)[columns.message[rows]]
+        own["columns"] = {name: value[rows] for name, value in columns.columns.items()}
+    own |= {name: np.array(value)[kept] for name, value in columns._asdict().items() if name not in own}
+    return columns._replace(**own)
