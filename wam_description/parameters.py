@@ -135,22 +135,16 @@ def fields(cls: type) -> tuple[Field, ...]:
 
 @cache
 def _fields(cls: type) -> tuple[Field, ...]:
-    are_live = getattr(cls, "are_live", False)
-    return tuple(field._replace(live=field.live or are_live) for field in _declared(cls))
-
-
-def _declared(cls: type) -> Iterator[Field]:
-    hints = _hints(cls)
+    hints, found = _hints(cls), list[Field]()
     for item in dataclasses.fields(cls):
         hint = hints[item.name]
-        if dataclasses.is_dataclass(hint):
-            assert isinstance(hint, type)
-            for field in fields(hint):
-                yield field._replace(name=f"{item.name}.{field.name}")
-            continue
-        is_array = get_origin(hint) is tuple
-        kind = get_args(hint)[0] if is_array else hint
-        yield Field(item.name, kind, is_array, **item.metadata)
+        if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+            found += [field._replace(name=f"{item.name}.{field.name}") for field in fields(hint)]
+        else:
+            is_array = get_origin(hint) is tuple
+            found.append(Field(item.name, get_args(hint)[0] if is_array else hint, is_array, **item.metadata))
+    are_live = getattr(cls, "are_live", False)
+    return tuple(field._replace(live=field.live or are_live) for field in found)
 
 
 def meant(name: str, known: Iterable[str]) -> str:
@@ -215,7 +209,9 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         names every missing and unknown parameter, or the first value that is not allowed.
     """
     known = {field.name: field for field in fields(cls)}
-    flat = {**_defaults(known.values(), flat), **flat}
+    # a parameter that follows one which is missing has no value either
+    defaults = {name: flat.get(field.follows, field.default) for name, field in known.items()}
+    flat = {**{name: value for name, value in defaults.items() if value is not None}, **flat}
     missing = [name for name in known if name not in flat]
     unknown = [name for name in flat if name not in known]
     if missing or unknown:
@@ -224,12 +220,6 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         parts += ["docs/parameters.md lists what there is"] * cls.__module__.startswith("wam_")
         raise ParameterError("; ".join(parts))
     return _assemble(cls, nested({name: checked(field, flat[name]) for name, field in known.items()}))
-
-
-def _defaults(known: Iterable[Field], flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of parameters that need not be given; none of one that follows a missing one, which is then reported."""
-    found = {field.name: flat.get(field.follows, field.default) for field in known}
-    return {name: value for name, value in found.items() if value is not None}
 
 
 def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
