@@ -98,8 +98,8 @@ def identify_friction(
     rest : speed up to which the shaft is at rest, rad/s.
     window : s.
     use : (n,), samples that may be used; None for all.
-    load : (n, k), torques of unknown size that also act, as those of a weight over the angle; None for none.  Their
-        part is identified in motion and taken off.
+    load : (n, k), torques of unknown size that also act, as those of a weight over the angle; None for none.  With them
+        no breakaway is looked for, as not all of them are known at rest.
     waves : (n, k), N m, torques of which only the rms is known: each acts with a factor of unknown sign and about one,
         as the two quadratures of a cogging over the angle.  What they can change is part of all errors; None for none.
 
@@ -122,9 +122,10 @@ def identify_friction(
     )
     solution, errors, left = _in_motion(velocity, torque, acting, unknown, rest, half, period, allowed)
     dynamic, viscous, inertia, offset = map(FrictionNumber, solution[:4], errors[:4])
-    steady = acting @ np.nan_to_num(np.array(solution[4:])) + np.nan_to_num(offset.value)
-    breakaways = _breakaways(velocity, torque - steady, rest, 2 * half, allowed)
-    static, count = _static(*breakaways, dynamic.value, math.hypot(dynamic.error, left[0]), unknown)
+    static, count = UNKNOWN, 0
+    if load is None:
+        breakaways = _breakaways(velocity, torque - np.nan_to_num(offset.value), rest, 2 * half, allowed)
+        static, count = _static(*breakaways, dynamic.value, math.hypot(dynamic.error, left[0]), unknown)
     return Friction(static, dynamic, viscous, inertia, offset.value, count, solution[4:], *left)
 
 
