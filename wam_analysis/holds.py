@@ -10,7 +10,7 @@ import numpy as np
 
 from wam_analysis.held_messages import held_of, intervals, step_at, value_changes
 from wam_analysis.thresholds import HOLD
-from wam_bag.arrays import Numbers, Times
+from wam_bag.arrays import Numbers
 from wam_control.force.contact_place import pinned_position
 from wam_control.force.task import TaskCommand, task_of
 from wam_description.arm import Arm
@@ -87,17 +87,6 @@ def task_forces(tasks: Iterable[RecordedTask]) -> Iterator[Hold]:
             position = math.nan if axis.position is None else axis.position
             number = i if len(forces) > 1 else -1
             yield Hold(begin, end, task.frame, np.array(axis.direction) * axis.value, axis.cover, position, number)
-
-
-def measured_force(run: RecordedRun, number: int, begin: int, end: int) -> tuple[Times, Numbers]:
-    """Stamps, ns, and the force that was measured along an axis of a task, N, between two times."""
-    columns = run.table("task_axes")
-    if columns is None or "measured" not in columns.columns:
-        return np.empty(0, np.int64), np.empty(0)
-    place = np.arange(len(columns.message)) - np.searchsorted(columns.message, columns.message)  # within its message
-    stamps = columns.row_stamp_ns
-    rows = (place == number) & (stamps >= begin) & (stamps < end)
-    return stamps[rows], np.asarray(columns.columns["measured"][rows], float)
 
 
 def holds_of(

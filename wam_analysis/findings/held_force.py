@@ -9,7 +9,7 @@ import numpy as np
 from wam_analysis.contact_list import most
 from wam_analysis.findings.prediction import Guarded, Predicted, PressedPoint, guarded, node_at, predict
 from wam_analysis.held_messages import joint_angles, row_at
-from wam_analysis.holds import Hold, measured_force
+from wam_analysis.holds import Hold
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, force_response
 from wam_analysis.measures.runs import noise
@@ -147,16 +147,22 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
 
 
 def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:
+    """When a force along a hold was measured, s from its begin, and this force, N, (n,) each."""
+    stamps, along = np.empty(0, np.int64), np.empty(0)
     if hold.axis >= 0:
-        stamps, value = measured_force(run, hold.axis, hold.begin, hold.end)
-        return (stamps - hold.begin) / 1e9, value
-    columns = run.wrench("force_measured")
-    if columns is None or not np.any(columns.force):  # an open loop measures none
-        return np.empty(0), np.empty(0)
-    a, b = np.searchsorted(columns.stamp_ns, [hold.begin, hold.end])
-    along: Numbers = columns.force[a:b] @ (hold.force / hold.commanded)
-    good = np.isfinite(along)
-    return (columns.stamp_ns[a:b][good] - hold.begin) / 1e9, along[good]
+        axes = run.table("task_axes")
+        if axes is not None and "measured" in axes.columns:
+            place = np.arange(len(axes.message)) - np.searchsorted(axes.message, axes.message)  # within its message
+            own = place == hold.axis
+            stamps, along = axes.row_stamp_ns[own], axes.columns["measured"][own].astype(float)
+    else:
+        wrench = run.wrench("force_measured")
+        if wrench is not None and np.any(wrench.force):  # an open loop measures none
+            rows = slice(*np.searchsorted(wrench.stamp_ns, [hold.begin, hold.end]))
+            stamps, along = wrench.stamp_ns[rows], wrench.force[rows] @ (hold.force / hold.commanded)
+            stamps, along = stamps[np.isfinite(along)], along[np.isfinite(along)]
+    during = (stamps >= hold.begin) & (stamps < hold.end)
+    return (stamps[during] - hold.begin) / 1e9, along[during]
 
 
 def _accuracy(error: Numbers) -> ForceAccuracy:
