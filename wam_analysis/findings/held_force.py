@@ -147,7 +147,7 @@ def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameter
 
 
 def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:
-    """When a force along a hold was measured, s from its begin, and this force, N, (n,) each."""
+    """When a force along a hold was measured, s from its start, and this force, N, (n,) each."""
     stamps, along = np.empty(0, np.int64), np.empty(0)
     if hold.axis >= 0:
         axes = run.table("task_axes")
