@@ -118,7 +118,7 @@ class CycleThresholds:
     clear_line: float = 0.01  # of the largest line: smaller ones are not reported
     # a signal that follows a command
     compared: int = 4000  # samples at most
-    longest_delay: float = 0.5  # s
+    longest_delay: float = 0.5  # s, up to which it is looked for first
     delays: int = 101  # of a search, to both sides
     sections: int = 10  # golden ones, until a play is known to 1 % of what it may be
     # steps
@@ -231,7 +231,8 @@ class StreamThresholds:
     pace: float = 0.2  # by which the median period of the receptions may differ from that of the stamps
     # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
     reset: int = 1_000_000_000
-    late: int = 50_000_000  # ns after which few messages are received, and before which none is
+    late: int = 50_000_000  # ns after which few messages are received
+    ahead: int = 2_000_000  # ns before its stamp that no message is received, by clocks that are kept equal
     away: int = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
     live: float = 0.1  # of the time that the stamps take: receptions in less are those of a file that was converted
     drift: float = 1e-3  # of its speed, by which a clock is wrong: of quartz 1e-4 at most, while it is adjusted 5e-4
@@ -245,12 +246,9 @@ class StreamThresholds:
     seconds: float = 1e18  # a time below this is in seconds or less, above it in ns since 1970
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
     spikes: float = 0.02  # of the steps of a position: so many may lead to single wrong values and back
-    paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
-    exact: int = 1000  # ns: waits that differ by less are one
     steps: int = 64  # from stamp to stamp, from which a rate is known
     changes: float = 1.5  # periods: a step that is longer lacks a message, and a period that is longer is another one
     regular: float = 0.6  # of the steps, within `pace` of whole periods: with fewer no message is known to be missing
-    relayed: float = 0.6  # of the messages: so many change at most where each comes again
     evenly: float = 0.9  # of the changes of a signal: so many are as far apart, if it is held over between them
     counts: float = 2.0  # smallest changes: those of an encoder are mostly smaller
     turns: tuple[float, ...] = (

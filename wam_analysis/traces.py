@@ -7,6 +7,7 @@ import numpy as np
 
 from wam_analysis.held_messages import held_of, held_rows, joint_angles, with_holes
 from wam_analysis.holds import Hold
+from wam_analysis.measures.runs import interpolated, median_step
 from wam_analysis.thresholds import TOUCH
 from wam_bag.arrays import Mask, Numbers, Texts, Times
 from wam_description.arm import Arm
@@ -112,7 +113,7 @@ class Traces(NamedTuple):
     @property
     def period(self) -> float:
         """Time between two instants, s."""
-        return float(np.median(np.diff(self.stamp))) / 1e9 if len(self.stamp) > 1 else 0.0
+        return median_step(self.stamp) / 1e9
 
     @property
     def is_compared(self) -> Mask:
@@ -228,7 +229,7 @@ def _on_links(
     if not len(rows) or poses is None:
         return signals
     rows = rows[np.isin(covers[rows], arm.covers.names)]
-    q = np.stack([np.interp(base[rows], poses[0], angle) for angle in poses[1].T], axis=1)
+    q = interpolated(base[rows], *poses)
     body = RigidBody(arm)
     rotations = [body.cover_pose(one, cover).rotation.T for one, cover in zip(q, covers[rows].tolist(), strict=True)]
     found: list[ForceSignal] = []

@@ -145,7 +145,19 @@ def coarse() -> list[Case]:
     stall = [s._replace(received=max(s.received, 12.25 + 7e-5 * i) if 12.0 < s.received < 12.3 else s.received)
              for i, s in enumerate(unset)]  # fmt: skip
     gap = [s for s in unset if not 15.01 < s.received < 17.39]
+    sent = one("/joint_states", 100.0, 0.7, 0.5)
+    packets = {of: [s._replace(stamp=at, received=at + 5e-4) for i, s in enumerate(sent) for at in [
+        sent[min(i - i % of + of - 1, 2999)].stamp + 3e-4 * (i % of)]] for of in (2, 5)}  # fmt: skip
+    simulated = np.ceil(np.arange(3000) * 2.5) * 0.004  # by steps of 4 ms
+    moves = np.cumsum(np.clip(np.sin(0.8 * math.pi * simulated), 0.1, 0.4) - 0.1)[:, None] / 50.0
+    changes = [s for i, s in enumerate(joints("/js", np.arange(3000) / 100.0, ["a"], position=moves))
+               if not i or moves[i] != moves[i - 1]]  # fmt: skip
     return [
+        *(Case(f"packets of {of}", sqlite, those, sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0},
+               "placed evenly") for of, those in packets.items()),
+        Case("steps of a simulation", sqlite, joints("/js", simulated, ["a"], position=0.5 * np.sin(
+            1.4 * math.pi * simulated)[:, None]), sine(0.7, 0.5) | {"/js: period": 10.0}),
+        Case("only what changes", ros1, changes, {"a: motions": 12.0}, "messages come only when a value changes"),
         *(Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
                sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate}, "reception times are used")
           for name, write, rate, change in made),
@@ -337,10 +349,15 @@ def follows() -> list[Case]:
     return [
         Case("by whole periods", ros1, alike, {"a position: delay": 0.04, "a position: gain": 1.0}, "", to),
         Case("a stream", by_rosbags, streamed, {"a position: delay": 0.1, "a position: gain": 1.0}),
+        Case("a stream by another clock", sqlite, [s._replace(stamp=s.stamp + 20.0 * (s.topic == "/t"))
+             for s in streamed], {"a position: delay": 0.1, "a position: gain": 1.0}, "/t: stamps 20 s ahead"),
+        Case("away", ros1, joint(path(time), path(np.maximum(time - 0.8, 0.0))), {"a position: delay": 0.8}, "", to),
+        Case("before", ros1, joint(path(time), path(time + 0.3)), {}, "", to, ("a gain and a delay do not explain",)),
         Case("by two periods", sqlite, locked, {"a position: delay": 0.01585, "a position: gain": 1.0}, "", to),
         *(Case(f"a clock {by:g} s off", sqlite, [s._replace(stamp=s.stamp + by * (s.topic == topic))
                for s in joint(path(time), path(time - 0.03))], {"a position: delay": 0.03 - min(by, 0.0)}, told, to)
           for topic, by, told in (("/cmd", 0.35, "/cmd: stamps 0.35 s ahead"), ("/js", 0.6, "/js: stamps 0.6 s ahead"),
+                                  ("/cmd", 0.02, "/cmd: stamps 0.02 s ahead"),
                                   ("/cmd", -0.2, "0.2 s behind those of /js, as sent late"))),
         Case("late", by_rosbags, joint(path(time), 0.9 * path(time - 0.03)), {"a position: gain": 0.9,
              "a position: delay": 0.03}, "", to, ("Shows: a position: follows ",)),
@@ -536,6 +553,10 @@ def contradictions() -> list[Case]:
             for s in one("/js", 100.0, 0.1, 0.05)]  # fmt: skip
     both += [Case("a coarse velocity", sqlite, slow, {})]
     both += [Case("slow for its noise", by_rosbags, seen, {}), Case("pulses of an encoder", sqlite, pulses, {})]
+    speeds = np.diff(motion(50.0, 0.7, 0.5)[1], prepend=0.0) * 50.0
+    differences = [s._replace(fields=s.fields | {"velocity": [v]})
+                   for s, v in zip(one("/js", 50.0, 0.7, 0.5), speeds, strict=True)]  # fmt: skip
+    both += [Case("a difference", ros1, differences, sine(0.7, 0.5) | FRICTION, "velocity is about 0.01 s")]
     both += [late(10, by_rosbags, 100.0), late(4, ros1, 250.0), *(scaled(*each) for each in scales)]
     return [*both, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0),
             *(Case(f"slips by {by:g} now and then", by_rosbags, one("/js", 100.0, 0.3, 0.7, lambda q, by=by: q - by *
@@ -621,6 +642,7 @@ def other_units() -> list[Case]:
     two, in_degrees = "one of the two has another unit", "if its position is in deg, give --unit position=deg"
     return [
         Case("position alone", by_rosbags, alone, {}, in_degrees, NOTHING, ()),
+        Case("a belt", sqlite, joints("/s", np.arange(900) / 50.0, ["a"], position=0.3 * np.arange(900)[:, None]), {}),
         Case("linear", sqlite, slow, FRICTION, "", topic_map([], [], [], [], ["position=m"]), ("N, viscous", "N s/m")),
         *(Case("a motor's shaft and a wheel may turn often and fast", by_rosbags, sent, {}) for sent in often),
         scaled("position", degree, ros1, two, "deg (shown in rad", "mm (shown in m"),

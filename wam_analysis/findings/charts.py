@@ -99,7 +99,7 @@ def _forces_over_time(traces: Traces) -> Iterator[Chart]:
     if np.any(bound := traces.estimated.is_lower_bound):
         found |= {"at least": np.where(bound, found["estimated"], np.nan)}
         found["estimated"] = np.where(bound, np.nan, found["estimated"])
-    rising = np.concatenate(([True], np.diff(traces.stamp) > 0))
+    rising = np.diff(traces.stamp, prepend=-1) > 0
     lines = (ChartLine(name, FORCES[name], value[rising], name == "commanded") for name, value in found.items())
     time = (traces.stamp - traces.stamp[0])[rising] / 1e9
     yield Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time")

@@ -4,6 +4,7 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.transmission import TransmissionSignals
+from wam_analysis.measures.runs import median_step
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers
@@ -22,7 +23,7 @@ def efficiency_section(recording: AnalysedRecording) -> Section | None:
     time, motor, joint, loss = (one[known] for one in (signals.time, motor, joint, _losses(signals, has_strain)))
     put, got = works(time, motor, joint)
     put_back, got_back = works(time, -joint, -motor)
-    stored = float(np.sum(np.abs(motor[motor * joint < 0.0]))) * float(np.median(np.diff(signals.time)))
+    stored = float(np.sum(np.abs(motor[motor * joint < 0.0]))) * median_step(signals.time)
     sentences, findings = [], []
     if got > put or got_back > put_back or stored > put - got + put_back - got_back:
         sentences.append(
@@ -65,7 +66,7 @@ def works(time: Numbers, put: Numbers, got: Numbers) -> tuple[float, float]:
     Of a gap that is longer than the median period nothing is known: it holds no work.
     """
     steps = np.diff(time)
-    usual = np.median(steps) if len(steps) else 0.0
+    usual = median_step(time)
     dt = np.minimum(np.append(steps, usual), usual)[: len(time)]
     onward = (put > 0.0) & (got > 0.0)
     return float(put[onward] @ dt[onward]), float(got[onward] @ dt[onward])

@@ -12,7 +12,7 @@ from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.holds import Hold
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, force_response
-from wam_analysis.measures.runs import noise
+from wam_analysis.measures.runs import median_step, noise
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT, TOUCH
@@ -209,7 +209,7 @@ def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
     if np.count_nonzero(good) < SHAFT.fewest_samples or np.mean(good) <= 0.95:
         return None
     time, value = time[good], value[good]
-    if dither and (width := round(dither / float(np.median(np.diff(time))))) > 1:
+    if dither and (width := round(dither / median_step(time))) > 1:
         value = np.convolve(value, np.full(width, 1.0 / width), "valid")
         time = time[: len(value)]
     return limit_cycle(time, value)

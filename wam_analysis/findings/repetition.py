@@ -14,7 +14,7 @@ from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import spectral_lines
-from wam_analysis.measures.runs import count
+from wam_analysis.measures.runs import count, median_step
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
@@ -23,7 +23,6 @@ LEAST = {"rad": 1e-4, "m": 1e-5, "rad/s": 1e-3, "m/s": 1e-4, "N m": 1e-3, "N": 1
 
 COMMANDED_CYCLE, LIMIT_CYCLE, UNKNOWN = "commanded", "limit cycle", "not known whether commanded"
 HARMONIC = "near a multiple of the commanded frequency"
-PLACED = (Treatment.SPREAD, Treatment.BETWEEN)
 ORIGINS = {  # in words
     LIMIT_CYCLE: "a limit cycle: it was not commanded",
     HARMONIC: f"{HARMONIC}: a limit cycle, or the commanded motion, which is not followed linearly",
@@ -51,7 +50,7 @@ def repetition_section(recording: AnalysedRecording) -> Section:
         for piece in pieces(one, quantity):
             least = max(CYCLE.loud * piece.noise[quantity], LEAST[unit])
             for (begin, end, cycle), origin, error in _of_piece(piece, quantity, own, least):
-                if cycle.alternates and any(each.what in PLACED for each in one.treated):
+                if cycle.alternates and any(each.what is Treatment.BETWEEN for each in one.treated):
                     continue  # as a motion does whose messages are evenly placed, but were not sent so
                 name = label if label not in taken else f"{label} from {begin:.1f} s"
                 taken.add(name)
@@ -141,7 +140,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
             result.append(FoundCycle(one, COMMANDED_CYCLE))
     if rest is None or command is None:
         return result
-    rate = 1.0 / max(float(np.median(np.diff(command.time))), STREAM.quickest) if len(command.time) > 1 else 0.0
+    rate = 1.0 / max(median_step(command.time), STREAM.quickest) if len(command.time) > 1 else 0.0
     for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
         if min(abs(each * one.cycle.period - 1.0) for each in (frequency, rate)) <= CYCLE.same_period:
@@ -221,7 +220,7 @@ def is_known(command: Source, time: Numbers) -> bool:
 
     Of two topics that begin at once either may have the first message.
     """
-    period = float(np.median(np.diff(command.time))) if len(command.time) >= SHAFT.fewest_samples else 0.0
+    period = median_step(command.time) if len(command.time) >= SHAFT.fewest_samples else 0.0
     return bool(command.time[0] <= time[0] + STREAM.changes * period) and not np.any(command.is_away(time))
 
 

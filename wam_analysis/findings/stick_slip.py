@@ -12,9 +12,9 @@ from wam_analysis.findings.topics import in_words
 from wam_analysis.foreign.pieces import Piece, pieces, resolution, rests, ways
 from wam_analysis.foreign.source import Source
 from wam_analysis.measures.following import best_fit
-from wam_analysis.measures.runs import at_rest, count, runs, stays, without_turns
+from wam_analysis.measures.runs import at_rest, count, runs, stays, summed, without_turns
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import CYCLE, LAYOUT, SHAFT, STREAM
+from wam_analysis.thresholds import LAYOUT, SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers
 
 
@@ -169,8 +169,7 @@ def _delay(source: Source, command: Source | None) -> float:
     own, sent = source.known("position"), command.known("position") if command else np.zeros(0)
     if command is None or min(len(own), len(sent)) < SHAFT.fewest_samples or not np.ptp(sent):
         return 0.0
-    some = slice(None, None, math.ceil(len(own) / CYCLE.compared))
-    return best_fit(source.only("position").time[some], own[some], command.only("position").time, sent).delay
+    return best_fit(source.only("position").time, own, command.only("position").time, sent).delay
 
 
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:
@@ -207,7 +206,7 @@ def _lost_way(piece: Piece, unit: str) -> str:
     if len(time) <= width:
         return ""
     moved, by = ways(piece, width)
-    path = period * np.concatenate(([0.0], np.cumsum(np.abs(velocity[1:]))))
+    path = period * summed(np.abs(velocity[1:]))
     far, change = path[width:] - path[:-width], np.abs(velocity[width:] - velocity[:-width])
     left, turns = np.abs(moved - by), change >= 0.5 * np.max(change)
     lag = SHAFT.longest_effort_lag  # or what is much more than usual

@@ -48,8 +48,8 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
             name += f" of {', '.join(one.name or one.frame for one in those)}"
         stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
         columns: Any = recording.bag.topics[topic]
-        if len(columns.stamp_ns) > recording.bag.counts.get(topic, math.inf):
-            continue  # a path of trajectories
+        if first.sends_changes or len(columns.stamp_ns) > recording.bag.counts.get(topic, math.inf):
+            continue  # of a path of trajectories there are more
         is_table = np.array_equal(columns.stamp_ns, columns.log_time_ns)  # or messages without stamps
         yield name, stamp, None if is_table else received, math.nan, not first.is_command
 
@@ -69,7 +69,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
         times, rows = np.unique(stamp, return_index=True)
         steps = np.diff(times).astype(np.float64)
         periods = usual_steps(steps) if len(steps) else np.full(1, math.nan)
-        period, slowest = median(steps) / 1e9, float(np.max(periods)) / 1e9
+        period, slowest = median(periods) / 1e9, float(np.max(periods)) / 1e9
         lost, waits = missed(times, periods), np.diff(stamp)
         longest, backwards = int(np.argmax(waits)), np.sum(waits <= 0)
         gap, begin = float(waits[longest]) / 1e9, (stamp[longest] - first) / 1e9
@@ -108,7 +108,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
         if should_last and lost >= 0.0:
             least = max(STREAM.reset / 1e9, STREAM.filled * period)
             wrong += _silences(name, {"first": stamp[0] - first, "last": last - stamp[-1]}, least)
-    silent = "No message is missing." if findings else "No stamped topic was recorded."
+    silent = "No message is missing." if findings else "No stamped topic has a period."
     sentences = wrong or [silent] * (recording.is_foreign or not findings)  # ours lists what is lost
     if timed := [facts for facts in recording.loop if RATE in facts]:
         last = timed[-1]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from wam_analysis.findings.finding import Section, counted, shown, times, when
 from wam_analysis.foreign.clocks import clocks
 from wam_analysis.foreign.pieces import pieces
-from wam_analysis.foreign.source import Source, Treated
+from wam_analysis.foreign.source import Source, Treated, Treatment
 from wam_analysis.foreign.topic_map import QUANTITIES, UNITS, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -37,7 +37,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-        wrong += _too_large(name, columns, given, [one for one in found if one.topic == name])
+        wrong += _too_large(name, given, [one for one in found if one.topic == name])
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
@@ -76,23 +76,19 @@ def _topic(name: str, columns: Columns, count: int) -> Iterator[str]:
         yield f"{name}: {np.count_nonzero(known) or len(columns.force)} forces, {what}."
 
 
-def _too_large(name: str, columns: Columns, given: TopicMap, found: Sequence[Source]) -> Iterator[str]:
+def _too_large(name: str, given: TopicMap, found: Sequence[Source]) -> Iterator[str]:
     """Which values may be in another unit than that of ROS; a velocity that is the rate of a position is in none."""
-    slow = [not turns_often(joint) for joint in columns.names] if isinstance(columns, JointColumns) else []
     for quantity, most in UNUSUAL.items():
-        values = getattr(columns, quantity, np.empty(0))
-        if slow and values.size and quantity in ("position", "velocity"):
-            values = values[:, slow]
-        treated = [[part for name, part in one.values.items() if name.startswith(quantity)] for one in found]
-        largest = min(_largest(values), max(map(_largest, treated)) if treated and all(treated) else math.inf)
+        some = [one for one in found if not (quantity in ("position", "velocity") and turns(one))]
+        largest = max((_largest(v) for one in some for q, v in one.values.items() if q.startswith(quantity)), default=0)
         is_rate = quantity == "velocity" and any(abs(one.velocity_factor - 1.0) <= SHAFT.agree for one in found)
         if largest > most and quantity not in given.units and not is_rate:
             taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, more than most robots"
-            smaller: dict[tuple[float, str], str] = {}  # each in its first spelling
-            for unit, one in UNITS.items():
-                if one[0] < 1.0 and one[1] in QUANTITIES[quantity]:
-                    smaller.setdefault(one, unit)
-            units = " or ".join(f"--unit {quantity}={unit} (shown in {to})" for (_, to), unit in smaller.items())
+            fitting = [each for each in UNITS.items() if each[1][0] < 1.0 and each[1][1] in QUANTITIES[quantity]]
+            first = {one: unit for unit, one in reversed(fitting)}  # of its spellings
+            units = " or ".join(
+                f"--unit {quantity}={unit} (shown in {to})" for (_, to), unit in reversed(first.items())
+            )
             yield f"{name}: {taken}. If it was recorded in another unit, give {units}."
 
 
@@ -104,16 +100,19 @@ def _largest(values: ArrayLike) -> float:
 def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
     """Which joints would move faster than few do, where their velocity was not recorded."""
     for one in found:
-        if _lacks_velocity(one) and "position" not in given.units and not turns_often(one.name):
+        if _lacks_velocity(one) and "position" not in given.units and not turns(one):
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
             if (most := float(max(speeds, default=0.0))) > UNUSUAL["velocity"]:
                 why = "if its position is in deg, give --unit position=deg"
                 yield f"{one.label}: moves at up to {shown(most, 'rad/s')}; {why}."
 
 
-def turns_often(name: str) -> bool:
-    """Whether a joint is a wheel or the shaft of a motor, which turns often and fast."""
-    return any(word in name.lower() for word in ("motor", "wheel"))
+def turns(one: Source) -> bool:
+    """Whether a joint is a wheel or the shaft of a motor, or has no end: it turns mostly one way, or over 2 pi."""
+    steps = np.diff(one.known("position"))
+    is_endless = abs(np.sum(steps)) > SHAFT.much_better * np.sum(np.abs(steps))
+    is_endless |= any(each.what is Treatment.WRAPPED and each.size < UNUSUAL["position"] for each in one.treated)
+    return bool(is_endless) or any(word in one.name.lower() for word in ("motor", "wheel"))
 
 
 def _lacks_velocity(one: Source) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from wam_analysis.findings.finding import shown
 from wam_analysis.held_messages import by_names
 from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
-from wam_analysis.measures.runs import after_gaps
+from wam_analysis.measures.runs import after_gaps, interpolated, median_step
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers, Times
@@ -76,13 +76,13 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
         speed, _ = _of(run, "sim/joint_states", "velocity", joints, stamps)
     loads = {CABLE: cable, STRAIN: strain, GRAVITY: _of(run, "gravity_effort", "effort", joints, stamps)}
     simulated = run.joints("sim/joint_states")
-    if simulated is not None and float(np.median(np.diff(simulated.stamp_ns))) / 1e9 > SHAFT.slowest_period:
+    if simulated is not None and median_step(simulated.stamp_ns) / 1e9 > SHAFT.slowest_period:
         del loads[CABLE]
     load_from = next((name for name, (load, _) in loads.items() if np.any(np.isfinite(load))), "")
     if not load_from:
         return None
     at_joints, sampled = loads[load_from]
-    forward = np.concatenate(([True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]))  # time that a reset repeats
+    forward = np.diff(np.maximum.accumulate(stamps), prepend=-1) > 0  # time that a reset repeats
     rows = np.flatnonzero(np.all(np.isfinite(at_joints), axis=1) & forward)
     matrix = arm.transmission.joint_from_motor
     use = ~run.braked(stamps[rows], SHAFT.release)  # not before the cables have taken the load
@@ -147,8 +147,7 @@ def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps
         row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
         recorded = stamps == columns.stamp_ns[row]
         inside &= ~after_gaps(columns.stamp_ns)[row] | recorded
-        for i in range(len(names)):
-            result[inside, i] = np.interp(stamps[inside], columns.stamp_ns, values[:, i])
+        result[inside] = interpolated(stamps[inside], columns.stamp_ns, values)
     return result, recorded
 
 
@@ -246,8 +245,8 @@ def _unrecorded(signals: TransmissionSignals) -> Numbers:
     """
     time, rows = signals.time, np.unique([0, *np.flatnonzero(signals.sampled)])
     passed = signals.torque - signals.rotors
-    straight = np.column_stack([np.interp(time, time[rows], one[rows]) for one in passed.T])
-    late = 0.5 * np.median(np.diff(time)) * np.gradient(signals.load, time, axis=0)
+    straight = interpolated(time, time[rows], passed[rows])
+    late = 0.5 * median_step(time) * np.gradient(signals.load, time, axis=0)
     matrix = signals.arm.transmission.joint_from_motor
     apart = np.nan_to_num(signals.joint_velocity - signals.velocity @ matrix.T) * (signals.load_from != CABLE)
     return np.stack([late, passed - straight, apart * signals.arm.joints.viscous_friction @ matrix], axis=2)

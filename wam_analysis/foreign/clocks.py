@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown, times
 from wam_analysis.foreign.topic_map import COMMAND, UNITS, TopicMap
+from wam_analysis.measures.runs import median_step
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Index, Times
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
@@ -58,7 +59,7 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
     if "stamp" not in given.units:
         if np.min(numbers) > STREAM.seconds:
             return numbers.astype(np.int64)
-        step = float(np.median(np.diff(np.sort(numbers)))) if len(numbers) > 1 else 0.0
+        step = median_step(np.sort(numbers))
         took = 0.0 if received is None else float(np.ptp(received)) / 1e9
         whole = float(np.ptp(numbers))
         is_slower = step >= STREAM.slowest and whole > STREAM.faster * took
@@ -121,7 +122,10 @@ def _compared(clock: Clock, reference: Clock, name: str) -> Clock:
     spread = float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05))
     by, done = (apart, "reception times are used") if spread > STREAM.reset else (shift, "they are shifted by this")
     of = "of another clock" if len(apart) > 1 else "of another clock, or sent before the recording"
-    if max(abs(shift), spread) <= (STREAM.late if min(clock.age, reference.age) < -STREAM.late else STREAM.reset):
+    early, usual = sorted((clock.age, reference.age))
+    # no message is received before it is sent
+    limit = STREAM.ahead if early < -STREAM.ahead <= usual else STREAM.reset
+    if max(abs(shift), spread) <= limit:
         if abs(shift) <= STREAM.late or len(apart) < STREAM.fewest:
             return clock
         by, done, of = 0, "they are used", "sent late, or of another clock"
@@ -152,7 +156,7 @@ def rising(stamps: Times, received: Times) -> Times:
     if len(stamps) < 2:
         return stamps
     period = np.median(np.abs(np.diff(stamps)))  # longer where they are out of order, as of several threads
-    keeps_pace = abs(np.median(np.diff(received)) - period) <= STREAM.pace * period
+    keeps_pace = abs(median_step(received) - period) <= STREAM.pace * period
     age = received - stamps
     before, here, after = stamps[:-2], stamps[1:-1], stamps[2:]
     away = np.abs(age) > STREAM.away

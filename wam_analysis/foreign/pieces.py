@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.foreign.source import Source, Treated, Treatment
-from wam_analysis.measures.runs import count, noise, usual_steps
+from wam_analysis.measures.runs import count, noise, summed, usual_steps
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Numbers
 
@@ -49,7 +49,7 @@ def pieces(source: Source, *quantities: str) -> list[Piece]:
     period = float(np.median(steps))
     slow = steps[usual_steps(steps) > STREAM.changes * period]
     period = float(np.median(slow)) if 2.0 * np.sum(slow) > np.sum(steps) else period  # that of most of the time
-    inner = (np.flatnonzero(steps > STREAM.filled * period) + 1).tolist()
+    inner = (np.flatnonzero((steps > STREAM.filled * period) & (not source.sends_changes)) + 1).tolist()
     found = []
     for begin, end in zip([0, *inner], [*inner, len(source.time)], strict=True):
         time = source.time[begin:end]
@@ -160,7 +160,7 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
     lag = math.atan2(lost, kept) / slope if before < 0.0 < slope else 0.0
     if abs(factor - 1.0) > SHAFT.agree:
         return factor if abs(factor - 1.0) > SHAFT.agree + hidden else math.nan, None  # they contradict each other
-    if lost > doubt and lag > np.median(np.diff(source.time)):
+    if lost > doubt - SHAFT.much_better * SHAFT.late and lag:
         return factor, Treated(Treatment.LATE, "delay of the velocity", size=lag)
     return factor, Treated(Treatment.SCALED, "velocity", size=factor) if abs(factor - 1.0) > doubt else None
 
@@ -168,7 +168,7 @@ def velocity_fit(source: Source) -> tuple[float, Treated | None]:
 def ways(piece: Piece, width: int) -> tuple[Numbers, Numbers]:
     """By how much a joint moves in so many periods, by its position and by its recorded velocity."""
     position, velocity = piece.values["position"], piece.values["velocity"]
-    by = np.concatenate(([0.0], np.cumsum(moved_by(piece.time, velocity))))
+    by = summed(moved_by(piece.time, velocity))
     return position[width:] - position[:-width], by[width:] - by[:-width]
 
 

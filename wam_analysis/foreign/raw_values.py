@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from wam_analysis.foreign.pieces import moved_by, rests, velocity_fit
 from wam_analysis.foreign.source import Source, Treated, Treatment
 from wam_analysis.held_messages import row_at
-from wam_analysis.measures.runs import after_gaps, count, held_over, runs
+from wam_analysis.measures.runs import after_gaps, count, held_over, runs, summed
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Index, Mask, Numbers
 
@@ -187,7 +187,7 @@ def _unwrapped(time: Numbers, position: Numbers, speed: Numbers, is_command: boo
         turned = turn * np.rint((moved - steps) / turn)
         is_fast = np.any(np.abs(moved) > 0.5 * turn)
         if is_fast and np.quantile(np.abs(steps + turned - moved), STREAM.evenly) < SHAFT.agree * turn:
-            return position + np.concatenate([[0.0], np.cumsum(turned)]), int(np.count_nonzero(turned)), turn
+            return position + summed(turned), int(np.count_nonzero(turned)), turn
         within = turn - np.median(np.abs(steps[wraps]))  # in a wrap as much as elsewhere
         if within <= STREAM.alike * np.max(np.abs(steps[~wraps]), initial=0.0):
             return np.unwrap(position, period=turn), int(np.sum(wraps)), turn

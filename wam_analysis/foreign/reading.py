@@ -3,13 +3,14 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from typing import Any
 
 import numpy as np
 
 from wam_analysis.foreign.clocks import BILLION, dates, joined_times, nanoseconds
 from wam_analysis.foreign.topic_map import COMMAND, COMMANDED, QUANTITIES, TopicMap
+from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS, UNNAMED, joint_columns
@@ -245,9 +246,10 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
     """
     begins = _times(topic, columns, {}, given)
     begins = np.where(begins > 0, begins, columns.log_time_ns)  # a stamp of 0 means at once
+    age = int(np.median(columns.log_time_ns - begins)) * (len(begins) > 1)
     groups, times, held = list[Any](), [np.zeros(0, np.int64)], dict[tuple[str, ...], list[Numbers]]()
     wrong, (frame, *_) = 0, _frames(columns)
-    for message, begin, end in zip(columns.messages, begins.tolist(), [*begins.tolist()[1:], math.inf], strict=True):
+    for message, (begin, end) in zip(columns.messages, pairwise([*begins.tolist(), math.inf]), strict=True):
         points, names = getattr(message, "points", ()), tuple(map(str, getattr(message, "joint_names", ())))
         if not points:
             held = {}  # it cancels
@@ -274,7 +276,8 @@ def _paths(topic: str, columns: Messages, given: TopicMap) -> JointColumns:
         held = {names: left}
         groups.append((np.arange(len(at)) + sum(map(len, times)), (at, frame, names, taken[:3])))
         times.append(at)
-    found = joint_columns(np.concatenate(times), groups)
+    # what begins later is planned, if by less than clocks differ
+    found = joint_columns(np.concatenate(times) + age * (abs(age) > STREAM.reset), groups)
     return found._replace(irregular={**found.irregular, UNORDERED: wrong}) if wrong else found
 
 

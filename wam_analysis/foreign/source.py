@@ -16,11 +16,10 @@ AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 class Treatment(StrEnum):
     """What was found in raw values, and done to them before the analysis, in words."""
 
-    ROUNDED = "the stamps are rounded to {size}; reception times are used"
+    RECEIVED = "the stamps are coarse ({number} of {of} stamps repeat the one before); reception times are used"
     # the times of reception are coarse, too
-    SPREAD = "the stamps are rounded to {size}; the messages are placed evenly between them"
-    REPEATED = "{number} of {of} stamps repeat the one before; reception times are used"
-    BETWEEN = "{number} of {of} stamps repeat the one before; the messages are placed evenly between them"
+    BETWEEN = "stamps repeat, or are uneven, though the values are not; the messages are placed evenly"
+    ON_CHANGE = "messages come only when a value changes, so that none is known to be missing"
     TWICE = "{number} of {of} stamps came twice; the first message of each is used"
     RELAYED = "{number} of {of} messages repeat the one before at another interval, as by a relay; the others are used"
     WRAPPED = "the {quantity} jumps {times} by {size}; it is unwrapped"
@@ -43,8 +42,7 @@ class Treated(NamedTuple):
     what : the kind.
     quantity : of which, '' for the messages.
     number, of : how many, of all; 0 where it is not stated.
-    size : of a wrap, or the largest of the jumps, in the unit of the quantity; s, to which stamps are rounded; of a
-        velocity, per rate of the position.
+    size : of a wrap, or the largest of the jumps, in the unit of the quantity; of a velocity, per rate of the position.
     """
 
     what: Treatment
@@ -115,6 +113,11 @@ class Source(NamedTuple):
         return self._replace(
             values={q: v for q, v in self.values.items() if q != quantity}, treated=(*self.treated, treated)
         )
+
+    @property
+    def sends_changes(self) -> bool:
+        """Whether its sender waits for a change, and nothing happens in its gaps."""
+        return any(one.what is Treatment.ON_CHANGE for one in self.treated)
 
     @property
     def is_joint(self) -> bool:

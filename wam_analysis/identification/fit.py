@@ -15,6 +15,7 @@ from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.tracked_errors import TrackedErrors, Uncertainty, tracked_errors
 from wam_analysis.identification.unknowns import DIRECTIONS, Unknowns, unknowns, with_kept_weight
+from wam_analysis.measures.runs import median_step
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers, Rows
 from wam_description.arm import Shared
@@ -249,7 +250,7 @@ def _moved_by_averaging(best: _Estimate) -> Numbers:
     if len(weights) <= IDENTIFY.averaged:
         return np.zeros_like(best.values)
     span = equations.time[2 * edge :] - equations.time[: -2 * edge]
-    follow = span < (IDENTIFY.averaged - 0.5) * np.median(np.diff(equations.time))
+    follow = span < (IDENTIFY.averaged - 0.5) * median_step(equations.time)
     whole = sliding_window_view(equations.is_used, IDENTIFY.averaged, 0).all(-1) & follow[:, None]
 
     def solved(torque: Numbers, columns: Numbers) -> Numbers:
@@ -268,7 +269,7 @@ def _result(sought: Unknowns, best: _Estimate, uncertainty: Uncertainty, tracked
     equations = best.equations
     before = equations.torque - equations.columns @ sought.present
     left = equations.torque - equations.columns @ best.values
-    step = float(np.median(np.diff(equations.time)))
+    step = median_step(equations.time)
     moves = equations.columns[:, :, sought.places("motors.viscous")].diagonal(axis1=1, axis2=2)
     by_part = [moves[best.part == i] for i in range(IDENTIFY.parts)]
     both = np.sum([(each > 0.0).any(0) & (each < 0.0).any(0) for each in by_part], axis=0)

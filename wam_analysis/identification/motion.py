@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.held_messages import by_names
+from wam_analysis.measures.runs import interpolated, median_step
 from wam_analysis.thresholds import IDENTIFY, STREAM
 from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import BagError
@@ -143,15 +144,15 @@ def _evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> tuple[Numbers, 
             f"{len(first)} motor states over {span:.3g} s; identification needs {IDENTIFY.shortest:g} s or more"
         )
     stamps, theta, effort = stamps[first], theta[first], effort[first]
-    period = float(np.median(np.diff(stamps)))
+    period = median_step(stamps)
     if period > IDENTIFY.window / 4.0:
         raise ValueError(
             f"motor_states have a period of {period:g} s; identification needs {IDENTIFY.window / 4.0:g} s or less"
         )
     time = np.arange(stamps[0], stamps[-1], period)
     # torque acts in the period that ends at its stamp: it is that of the middle of the period
-    theta = np.column_stack([np.interp(time, stamps, column) for column in theta.T])
-    torque = np.column_stack([np.interp(time, stamps - 0.5 * period, column) for column in effort.T])
+    theta = interpolated(time, stamps, theta)
+    torque = interpolated(time, stamps - 0.5 * period, effort)
     late = np.diff(stamps, append=stamps[-1])[np.searchsorted(stamps, time + 0.01 * period, side="right") - 1]
     is_used = (late <= IDENTIFY.largest_gap * period) & (np.abs(torque) > IDENTIFY.braked).any(1)
     return time, theta, torque, is_used

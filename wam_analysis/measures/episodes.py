@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.measures.limit_cycle import LimitCycle, averaged, limit_cycle
-from wam_analysis.measures.runs import runs, smoothed
+from wam_analysis.measures.runs import runs, smoothed, summed
 from wam_analysis.thresholds import CYCLE
 from wam_bag.arrays import Mask, Numbers
 
@@ -142,7 +142,7 @@ def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
     middle = np.arange(end, len(value) - end) + 0.5
     away = np.arange(1, end + 1) / end
     for _ in range(2):
-        total = np.concatenate([[0.0], np.cumsum(value)])
+        total = summed(value)
         ends = (np.interp(middle + way * half, np.arange(len(total)), total) for way in (1.0, -1.0))
         slow = (next(ends) - next(ends)) / (2.0 * half)
         before = slow[0] - away[::-1] * (slow[end] - slow[0])
@@ -155,7 +155,7 @@ def _amplitude(time: Numbers, flat: Numbers, period: float) -> Numbers:
     """Half of the amplitude at a period, averaged over two, (n,)."""
     width = _width(time, period)
     turns = flat * np.exp(-2j * np.pi * (time - time[0]) / period)
-    total, row = np.concatenate([[0.0], np.cumsum(turns)]), np.arange(len(flat))
+    total, row = summed(turns), np.arange(len(flat))
     low, high = np.maximum(row - width // 2, 0), np.minimum(row + width // 2, len(flat))  # narrower at both ends
     return np.asarray(np.abs(total[high] - total[low]) / (high - low))
 

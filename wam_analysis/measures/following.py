@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.measures.runs import median_step
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
 
@@ -58,9 +59,7 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     rms, largest = math.sqrt(np.mean(error**2)), float(np.max(np.abs(error)))
     steps = np.sort(np.diff(stamps))
     usual = float(steps[np.searchsorted(np.cumsum(steps), 0.5 * np.sum(steps))])  # for half of the time
-    shows_steps = STREAM.changes * float(np.median(np.diff(time))) < usual
-    some = slice(None, None, math.ceil(len(time) / CYCLE.compared))
-    time, value = time[some], value[some]
+    shows_steps = STREAM.changes * median_step(time) < usual
     motion = float(np.std(value)) or math.inf
     fits = [best_fit(time, value, *path) for path in paths]
     is_held = shows_steps and fits[1].rest < SHAFT.much_better * fits[0].rest
@@ -90,21 +89,30 @@ def _played(path: Numbers, play: float) -> Numbers:
     return moved
 
 
-def best_fit(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> _Fit:
-    """The fit with the delay that leaves less than those about it; where a command repeats, the shortest such."""
-    span = CYCLE.longest_delay * np.linspace(-1.0, 1.0, CYCLE.delays)
-    fits = [_fit(time, value, stamps, sent, delay) for delay in span.tolist()]
+def best_fit(
+    time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers, longest: float = CYCLE.longest_delay
+) -> _Fit:
+    """The fit with the delay that leaves less than those about it; where a command repeats, the shortest such.
+
+    Nothing moves before its command.  A delay of up to four times the longest, s, is taken where no other explains it.
+    """
+    some = slice(None, None, math.ceil(len(time) / CYCLE.compared))
+    time, value = time[some], value[some]
+    span = longest * np.linspace(-1.0, 1.0, CYCLE.delays)
+    fits = [_fit(time, value, stamps, sent, delay) for delay in span[CYCLE.delays // 2 - 1 :].tolist()]
     right = [one for one in fits if one.gain > 0.0] or fits
     if SHAFT.much_better * min(right).rest > min(fits).rest:
         right = fits  # its sign is the other one
     most = min(right).rest / SHAFT.better
     about = zip(right, right[1:], right[2:], strict=False)
     least = [here for before, here, after in about if here.rest <= most and here <= min(before, after)]
-    best = min(least, key=lambda one: abs(one.delay), default=min(right))
+    best = next(iter(least), min(right))
     for finer in (0.5 * CYCLE.delays, (0.5 * CYCLE.delays) ** 2):
         near = best.delay + span / finer
         best = min(_fit(time, value, stamps, sent, delay) for delay in near.tolist())
-    return best
+    if best.rest < SHAFT.agree * np.std(value) or longest > CYCLE.longest_delay:
+        return best
+    return min(best, best_fit(time, value, stamps, sent, 4.0 * longest))
 
 
 def _fit(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers, delay: float) -> _Fit:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.measures.runs import after_gaps, at_rest, noise, runs
+from wam_analysis.measures.runs import after_gaps, at_rest, median_step, noise, runs
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Index, Mask, Numbers, Rows
 
@@ -113,7 +113,7 @@ def identify_friction(
     if np.count_nonzero(allowed) < SHAFT.fewest_samples:
         return Friction()
     velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
-    period = float(np.median(np.diff(time)))
+    period = median_step(time)
     gaps = np.flatnonzero(after_gaps(time))
     allowed[gaps] = allowed[gaps - 1] = False  # no window extends over them
     half = max(1, round(window / period / 2.0))

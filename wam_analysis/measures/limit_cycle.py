@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.measures.runs import after_gaps, noise
+from wam_analysis.measures.runs import after_gaps, noise, summed
 from wam_analysis.thresholds import CYCLE
 from wam_bag.arrays import Numbers
 
@@ -156,7 +156,7 @@ def _refined(flat: Numbers, lag: float) -> float:
     if not (width := 2 * round(0.5 * averaged(lag, len(flat)))):
         return lag
     turns = flat * np.exp(-2j * np.pi * np.arange(len(flat)) / lag)
-    total = np.concatenate([[0.0], np.cumsum(turns)])
+    total = summed(turns)
     phase = np.unwrap(np.angle(total[width:] - total[:-width]))
     if len(phase) < width:
         return lag

@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyfit, polyval
 
 from wam_analysis.measures.limit_cycle import top
 from wam_analysis.thresholds import CYCLE
@@ -70,7 +71,7 @@ def _windowed(value: Numbers) -> tuple[Numbers, Numbers]:
     """A signal at a constant rate less its line, in a Hann window, and this window, whose mean is a half."""
     n = len(value)
     steps = np.linspace(0.0, 1.0, n)
-    flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
+    flat = value - polyval(steps, polyfit(steps, value, 1))
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n)
     return flat * window, window
 
@@ -86,7 +87,7 @@ def _noise(levels: Numbers, free: Mask, k: int) -> float:
     rows = rows[free[rows]]
     if len(rows) < 2:
         return math.inf
-    line = np.polynomial.polynomial.polyfit(np.log(rows / k), 2.0 * levels[rows], 1)
+    line = polyfit(np.log(rows / k), 2.0 * levels[rows], 1)
     nearest = levels[rows[np.abs(rows - k) <= 4]]
     level = max(line[0], 2.0 * np.mean(nearest)) if len(nearest) else line[0]
     return math.exp(float(level) + CYCLE.euler_gamma)

@@ -1,9 +1,11 @@
 """Intervals in which a condition holds, usual and missing times, and the noise of a signal."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.arrays import Mask, Numbers, Rows, Times
@@ -21,16 +23,31 @@ def after_gaps(time: Numbers | Rows) -> Mask:
     return np.concatenate([np.zeros(min(1, len(time)), np.bool_), late])
 
 
-def usual_steps(steps: Numbers) -> Numbers:
+def median_step(time: Numbers | Times) -> float:
+    """From sample to sample, in the unit of the times, (n,); 0 of a single one."""
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+
+def interpolated(time: Numbers | Times, stamps: Numbers | Times, values: Numbers) -> Numbers:
+    """Columns of values, (n, k), on straight lines between the stamps, at some times, (m, k)."""
+    return np.column_stack([np.interp(time, stamps, column) for column in values.T])
+
+
+def summed(value: NDArray[Any]) -> NDArray[Any]:
+    """The sum of a signal, (n,), before each sample and after the last, (n + 1,)."""
+    return np.concatenate([[0.0], np.cumsum(value)])
+
+
+def usual_steps(steps: Numbers | Times) -> Numbers:
     """The usual step about each, (n,): that of all, or of the steps about it where these are even, as at another rate.
 
-    Where many are missing the median of all is longer than a period.
+    Where many are missing the mean is longer than a period; where none is near it, as in packets, NaN.
     """
-    usual = np.median(steps[np.rint(steps / np.median(steps)) == 1.0])
-    number = len(steps) // STREAM.steps
-    if not number:
-        return np.full(len(steps), usual)
-    parts = steps[: number * STREAM.steps].reshape(number, STREAM.steps)
+    number, size = max(len(steps) // STREAM.steps, 1), min(len(steps), STREAM.steps)
+    parts = steps[: number * size].reshape(number, size)
+    near = np.rint(steps / np.median(np.mean(parts, axis=1))) == 1.0
+    usual = np.median(steps[near]) if np.any(near) else math.nan
+    usual = np.median(steps[np.rint(steps / usual) == 1.0]) if np.any(near) else usual
     own = np.median(parts, axis=1, keepdims=True)
     is_even = np.mean(np.abs(parts - own) <= STREAM.pace * own, axis=1) >= STREAM.evenly
     near = np.pad(np.where(is_even, own[:, 0], usual), 1, "edge")
@@ -229,7 +246,7 @@ def smoothed(value: Numbers, width: int) -> Numbers:
     half = min(width // 2, (len(value) - 1) // 2)
     if half <= 0:
         return value.astype(np.float64)
-    total = np.concatenate(([0.0], np.cumsum(value)))
+    total = summed(value)
     row = np.arange(len(value))
     reach = np.minimum(half, np.minimum(row, len(value) - 1 - row))
     return (total[row + reach + 1] - total[row - reach]) / (2 * reach + 1)
