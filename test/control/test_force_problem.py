@@ -1,5 +1,6 @@
 """The problem of one period against its own definition: nothing that is allowed is better."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import quadprog
 from numpy.typing import NDArray
 
-from wam_control.force.problem import RANK, VelocityRow, linear, solve
+from wam_control.force.problem import PUSHED, RANK, VelocityRow, linear, solve
 from wam_description.small_matrices import solution
 
 Array = NDArray[np.float64]
@@ -41,7 +42,9 @@ def random_case(seed: int, rows: int | None = None, pushes: int | None = None) -
 def cost(case: Case, v: Array) -> float:
     off = sum((row.along @ v - row.speed) ** 2 / row.size**2 for row in case.rows)
     short = sum(max(0.0, row.speed - row.along @ v) ** 2 / row.size**2 for row in case.least)
-    return float((v - case.posture) @ (v - case.posture) + RANK * (off + short))
+    _, free = solve(*case)
+    rank = PUSHED if any(row.along @ free < row.speed for row in case.least) else RANK
+    return float((v - case.posture) @ (v - case.posture) + rank * (off + short))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -94,10 +97,23 @@ def test_a_row_comes_before_the_posture_and_a_push_as_high_as_a_row() -> None:
     found, _ = solve([VelocityRow(along, 0.1)], posture, [], -far, far)
     assert along @ found == pytest.approx(0.1)
     assert aside @ found == pytest.approx(aside @ posture), "what is left belongs to the posture"
+
+    def shared(*speeds: float) -> float:
+        """Of rows of the posture, with the first speed, and of others along the same direction."""
+        return (speeds[0] + PUSHED * sum(speeds[1:])) / (1.0 + PUSHED * len(speeds[1:]))
+
     pushed, _ = solve([VelocityRow(along, 0.1)], posture, [VelocityRow(along, 0.3)], -far, far)
-    assert along @ pushed == pytest.approx(0.2, abs=1e-4), "half of what contradicts each other"
+    assert along @ pushed == pytest.approx(shared(along @ posture, 0.1, 0.3), abs=1e-4), "half of what contradicts"
     apart, _ = solve([VelocityRow(along, 0.1)], posture, [VelocityRow(aside, 0.7)], -far, far)
-    assert (along @ apart, aside @ apart) == (pytest.approx(0.1, abs=1e-4), pytest.approx(0.7, abs=1e-4))
+    assert along @ apart == pytest.approx(shared(along @ posture, 0.1), abs=1e-4)
+    assert aside @ apart == pytest.approx(shared(aside @ posture, 0.7), abs=1e-4)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-3, 1e-2, 0.1, 0.3])
+def test_a_push_that_is_nearly_along_a_row_moves_the_arm_slowly_across_it(angle: float) -> None:
+    far, turned = np.full(N, 99.0), np.array([math.cos(angle), math.sin(angle), 0.0, 0.0])
+    found, _ = solve([VelocityRow(np.eye(N)[0], 0.0)], np.zeros(N), [VelocityRow(turned, 0.1)], -far, far)
+    assert np.linalg.norm(found) <= 0.05 * math.sqrt(PUSHED)
 
 
 @pytest.mark.parametrize("along", [np.zeros(N), np.full(N, 1e-12)])

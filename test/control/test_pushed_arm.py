@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from arms import CONFIGURATION
+from arms import CONFIGURATION, WAM
 from test_force_lasting import BODY, DIRECTION, OUTER, POSE, press
 
 from wam_control.task.scenario import ScenarioStep
@@ -14,7 +14,8 @@ from wam_description.event import Code, Level
 from wam_description.signals import ForceCommand, NodeStatus
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
-from wam_studies.force_benchmark.tasks import RANGES, triple
+from wam_studies.force_benchmark.tasks import RANGES, draw, triple
+from wam_studies.force_benchmark.trial import perform
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact
 
@@ -108,3 +109,9 @@ def test_a_force_along_what_the_arm_touches_does_not_press_it_ever_harder() -> N
     while not run.step():
         peak = max(peak, math.hypot(*run.driver.true_contact.force))
     assert 1.5 < peak < 1.5 * 8.0
+
+
+def test_an_arm_that_has_touched_too_hard_does_not_swing_as_it_gives_way() -> None:
+    """It pressed with up to 36 N: what was commanded and the way back were nearly one direction, and it went across."""
+    task = draw(WAM, 9504, 388)
+    assert 0.5 < perform(CONFIGURATION, task).peak / task.force < 2.5

@@ -4,7 +4,8 @@ Minimise  |v - p|^2 + W sum_i (r_i.v - s_i)^2 + W sum_j max(0, g_j - t_j.v)^2   
 
 with every row scaled to length 1.  Rows (r, s) are commanded, one-sided rows (t, g) are least velocities, p is the
 posture.  The bounds always hold, so there is always a solution.  W puts the rows far above the posture; rows that
-contradict each other share what is left.
+contradict each other share what is left.  An arm that gives way needs a smaller W: a push is often nearly along a row,
+and with a large one the arm would move fast across both, to do both.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,9 @@ from wam_control.thresholds import MOTION
 from wam_description.rigid_body import Array
 from wam_description.small_matrices import inverse, length, outer, solution
 
-RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
+# W: weight of a row per weight of the posture
+RANK: Final = 1e6  # the posture moves along it by a millionth
+PUSHED: Final = 100.0  # of an arm that gives way: it moves no faster than five times the push
 
 
 class VelocityRow(NamedTuple):
@@ -59,9 +62,11 @@ def solve(
     free = unlimited(rows, posture)
     each = zip(low, free.tolist(), high)  # noqa: B905 - as long as each other
     is_inside = all([slowest <= speed <= fastest for slowest, speed, fastest in each])  # noqa: C419 - a list takes half the time
-    if is_inside and all(along.dot(free) >= speed for along, speed in least):
+    active = [speed for along, speed in least if along.dot(free) < speed]
+    if is_inside and not active:
         return free, free
-    return _limited(rows, posture, least, np.array(low), np.array(high)), free
+    rank = PUSHED if max(active, default=0.0) > 0.0 else RANK
+    return _limited(rows, posture, least, np.array(low), np.array(high), rank), free
 
 
 def unlimited(rows: Sequence[VelocityRow], posture: Array) -> Array:
@@ -79,14 +84,19 @@ def _used(rows: Sequence[VelocityRow]) -> list[VelocityRow]:
 
 
 def _limited(
-    rows: Sequence[VelocityRow], posture: Array, least: Sequence[VelocityRow], low: Array, high: Array
+    rows: Sequence[VelocityRow],
+    posture: Array,
+    least: Sequence[VelocityRow],
+    low: Array,
+    high: Array,
+    rank: float,
 ) -> Array:
     """The same with limits: each one-sided row has a slack of its own."""
     if not rows and not least:  # no joint depends on another
         return np.clip(posture, low, high)
     n, m = len(posture), len(least)
-    matrix, right = _normal(rows, posture)
-    quadratic = RANK * np.eye(n + m)
+    matrix, right = _normal(rows, posture, rank)
+    quadratic = rank * np.eye(n + m)
     quadratic[:n, :n] = matrix
     sides = np.zeros((n + m, 2 * n + m))
     sides[:n, :n], sides[:n, n : 2 * n] = np.eye(n), -np.eye(n)
@@ -99,11 +109,11 @@ def _limited(
     return result
 
 
-def _normal(rows: Sequence[VelocityRow], posture: Array) -> tuple[Array, Array]:
+def _normal(rows: Sequence[VelocityRow], posture: Array, rank: float = RANK) -> tuple[Array, Array]:
     """Matrix (n, n) and right side (n,) of the problem without limits."""
     matrix, right = np.eye(len(posture)), posture
     for along, speed in rows:
-        weighted = along * (RANK / along.dot(along))
+        weighted = along * (rank / along.dot(along))
         matrix = matrix + outer(weighted, along)
         right = right + speed * weighted
     return matrix, right
