@@ -299,7 +299,7 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
             out = world.loop.step(ForceInput(still, DT, None, contact, external, task=base(force(10.0))))
             wound = wound or (out.known[0].force if any(out.effort) else 0.0)
         assert out.effort == pytest.approx((share * 10.0 - wound) * lever, rel=1e-2)
-    assert 2.0 <= wound < 4.0
+    assert wound == pytest.approx(8.0, rel=0.15), "what is pressed, but for the delay of its measurement"
 
 
 def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, GuardedTask, GuardedForces]:

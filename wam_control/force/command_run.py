@@ -66,13 +66,17 @@ class AxisRun:
         The law would press too hard, if it compared a measured force that is late with a commanded one that is not.
         """
         desired = self.now.desired
-        if not (own.limits.impact and self.touch.is_there):
+        if not (own.limits.impact and self.touch.is_there) or self.is_settling(own):
             self.rising = self._shown = self.known.force if own.limits.impact else desired
             return desired
         most = max(desired, self.rising) * dt / max(FORCE.ramp * own.latency, dt)
         self.rising += min(max(desired - self.rising, -most), most)
         self._shown += (self.rising - self._shown) * dt / (FORCE.shown * own.latency + dt)
         return self._shown
+
+    def is_settling(self, own: ForceLoopParameters) -> bool:
+        """Whether the motors do not show yet with which force the arm has touched."""
+        return own.is_estimated and self.touch.is_bouncing and not math.isfinite(self.wound_up)
 
     def goal(self, dt: float, lasting: float) -> float:
         """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""
@@ -268,7 +272,7 @@ class CommandRun:
             if not holds:
                 fed += own.force_feedforward * axis.desired * axis.along
             if self.is_touching and axis.is_force and axis.place is not None:
-                if holds or not axis.place.is_known:
+                if holds or not axis.place.is_known or one.is_settling(own):
                     one.wound_up = math.inf
                     continue
                 if not math.isfinite(one.wound_up):

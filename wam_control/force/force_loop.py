@@ -416,7 +416,7 @@ class ForceLoop:
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
             one.is_kept = one.touch.is_there and abs(axis.desired - known.force) < band
-            if one.is_kept:
+            if one.is_kept or (one.touch.is_there and one.is_settling(own)):
                 return 0.0
         error = expected - known.force
         speed = factor * one.watch.oscillation.share * law.velocity(0, error, expected - known.before, dt)

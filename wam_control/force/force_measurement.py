@@ -117,9 +117,10 @@ class ForceMeasurement:
         dt, torque = given.dt, self._torque(own, given)
         self._q, self._torque_sd = given.joints.position, self._none + own.sensing_fed_back.torque_sd
         self.rest.step(torque, given.joints, self._torque_sd, dt)
-        is_first = not self._filter.value
-        counted = torque - self._zeros if is_touched or not own.is_estimated else self._none
-        now = np.array(self._filter.step(counted.tolist(), own.force_filter, dt))
+        last = self._filter.value
+        now = self._filter.step((torque - self._zeros).tolist(), own.force_filter, dt)
+        if own.is_estimated and not is_touched:
+            now = last = [0.0] * len(now)
         velocity = [0.0] * len(self._none) if given.sensors is None else given.sensors.velocity
         change = [(new - old) / dt for new, old in zip(velocity, self._velocity or velocity, strict=True)]
         filtered = self._acceleration.step(change, own.force_filter, dt)
@@ -127,7 +128,7 @@ class ForceMeasurement:
         acceleration = np.array(filtered) if own.feedback == "joint_sensors" else None
         stated = given.external_sd if own.is_estimated else None
         sd = np.maximum(stated, FORCE.least_sd) if stated else self._torque_sd
-        self.torques = WorldTorques(now, now if is_first else self.torques.now, acceleration, sd)
+        self.torques = WorldTorques(np.array(now), np.array(last or now), acceleration, sd)
         if self.rest.time > FORCE.steady_time and not is_pressing:
             seen = self._taken(self.rest.torques)
             self._before = seen if seen.mass or not is_touched else self._before
