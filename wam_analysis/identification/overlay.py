@@ -12,7 +12,7 @@ from wam_analysis.identification.unknowns import DIRECTIONS, OF_LINK, Unknowns
 from wam_analysis.thresholds import IDENTIFY, LAYOUT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Shared
-from wam_description.configuration import BASE, PARAMETERS, SHARED, Configuration, shaped_like
+from wam_description.configuration import BASE, GIVEN, PARAMETERS, SHARED, Configuration, shaped_like
 from wam_description.parameters import ParameterError, nested
 
 HEADING = "# The controllers' model as identified"  # of the file
@@ -76,7 +76,8 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     try:
         _ = configuration.with_values(values).shared.model_arm
     except ParameterError as error:
-        reason = str(error).rpartition(f"section '{SHARED}': ")[2]  # who reads it has set no value
+        where = f", section '{SHARED}': "  # who reads it has set no value
+        reason = str(error).removeprefix(GIVEN + where).removeprefix(f"{configuration.path}{where}")
         return (
             f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "
             "touched the arm, or it moved too little: identify from a recording without contact, such as "

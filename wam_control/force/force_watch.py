@@ -74,22 +74,22 @@ class Turns:
 
 
 class TouchWatch:
-    """Whether something is touched now, and whether and for how long, s, it has been since the first touch."""
+    """Whether something is touched now, and whether it was before."""
 
     def __init__(self) -> None:
         self.is_there = self.has_been = False
-        self.since = 0.0
+        self._since = 0.0
 
     def step(self, force: float, desired: float, sd: float, dt: float) -> None:
         """A force is measured, N, of a desired one, N; by its standard deviation, N, nothing is touched."""
         self.is_there = desired > 0.0 and force >= max(FORCE.touch * desired, sd)
         self.has_been = self.has_been or self.is_there
-        self.since = self.since + dt if self.has_been else 0.0
+        self._since = self._since + dt if self.has_been else 0.0
 
     @property
     def is_bouncing(self) -> bool:
         """Whether the first touch was so short ago that an impact turns the force."""
-        return self.has_been and self.since < FORCE.impact_time
+        return self.has_been and self._since < FORCE.impact_time
 
 
 class Oscillation:
