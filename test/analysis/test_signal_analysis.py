@@ -128,10 +128,6 @@ def test_a_planted_cycle_is_recovered_from_noise_drift_and_hum(shape, period, hu
     assert found.cycles == near(6.0 / period)
 
 
-def random_walk(n: int) -> np.ndarray:
-    return np.cumsum(draws(5, n, 1.0))
-
-
 def test_the_last_cycle_of_a_signal_without_noise_is_that_of_its_end():
     time = np.arange(0.0, 12.0, 1e-3)
     size = 1.0 + 2.0 * (time < 6.0) + 0.5 * (time < 9.0)  # the last cycle alone has the size 2
@@ -142,7 +138,7 @@ def test_the_last_cycle_of_a_signal_without_noise_is_that_of_its_end():
 
 
 @pytest.mark.parametrize("value", [
-    draws(4, 5000, 1.0), np.exp(-np.arange(5000) / 400.0), np.ones(5000), random_walk(5000),
+    draws(4, 5000, 1.0), np.exp(-np.arange(5000) / 400.0), np.ones(5000), np.cumsum(draws(5, 5000, 1.0)),
     np.exp(-np.arange(5000) / 800.0) * np.sin(np.arange(5000) / 20.0), np.concatenate([np.zeros(2500), np.ones(2500)]),
 ], ids=["noise", "creep", "constant", "random walk", "ringing", "step"])  # fmt: skip
 def test_what_does_not_repeat_is_no_cycle(value):

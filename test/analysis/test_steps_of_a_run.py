@@ -24,7 +24,7 @@ from wam_analysis.findings.finding import Section
 from wam_analysis.findings.force import press_findings
 from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
-from wam_analysis.recorded import RecordedArm, prediction_parameters, recorded_arm
+from wam_analysis.recorded import prediction_parameters, recorded_arm
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_cli.commands.demo import _report
@@ -185,10 +185,6 @@ def said(message: str, stamp: int, level: int) -> Any:
 def event(code: str, reason: str = "why") -> dict[str, str]:
     holds = {"event.1.holds": "1.0"} if code == "refused" else {}
     return {"event.1": code, "event.1.severity": "WARN", "event.1.reason": reason, **holds}
-
-
-def arm_of(bag: Bag) -> RecordedArm:
-    return recorded_arm(prediction_parameters(recorded_parameters(bag, "/wam")))
 
 
 @pytest.mark.parametrize(
@@ -765,7 +761,8 @@ def test_arm_is_drawn_with_the_parameters_in_the_bag():
     sections = Configuration.load(packaged("wam")).sections
     flat = {**sections["/**"], **sections["driver"], "arm.covers.radius": [0.1, 0.05]}
     content = yaml.safe_dump({"/wam/driver": {"ros__parameters": flat}}).encode()
-    recorded = arm_of(Played().bag()._replace(attachments={"parameters.yaml": content}))
+    bag = Played().bag()._replace(attachments={"parameters.yaml": content})
+    recorded = recorded_arm(prediction_parameters(recorded_parameters(bag, "/wam")))
     assert recorded.note == ""
     assert recorded.arm.covers.radius == (0.1, 0.05)
     assert recorded.world.obstacles.names == ("foam_box",)

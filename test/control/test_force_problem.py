@@ -97,16 +97,12 @@ def test_a_row_comes_before_the_posture_and_a_push_as_high_as_a_row() -> None:
     found, _ = solve([VelocityRow(along, 0.1)], posture, [], -far, far)
     assert along @ found == pytest.approx(0.1)
     assert aside @ found == pytest.approx(aside @ posture), "what is left belongs to the posture"
-
-    def shared(*speeds: float) -> float:
-        """Of rows of the posture, with the first speed, and of others along the same direction."""
-        return (speeds[0] + PUSHED * sum(speeds[1:])) / (1.0 + PUSHED * len(speeds[1:]))
-
     pushed, _ = solve([VelocityRow(along, 0.1)], posture, [VelocityRow(along, 0.3)], -far, far)
-    assert along @ pushed == pytest.approx(shared(along @ posture, 0.1, 0.3), abs=1e-4), "half of what contradicts"
+    expected = (along @ posture + PUSHED * (0.1 + 0.3)) / (1.0 + 2.0 * PUSHED)
+    assert along @ pushed == pytest.approx(expected, abs=1e-4), "half of what contradicts each other"
     apart, _ = solve([VelocityRow(along, 0.1)], posture, [VelocityRow(aside, 0.7)], -far, far)
-    assert along @ apart == pytest.approx(shared(along @ posture, 0.1), abs=1e-4)
-    assert aside @ apart == pytest.approx(shared(aside @ posture, 0.7), abs=1e-4)
+    assert along @ apart == pytest.approx((along @ posture + PUSHED * 0.1) / (1.0 + PUSHED), abs=1e-4)
+    assert aside @ apart == pytest.approx((aside @ posture + PUSHED * 0.7) / (1.0 + PUSHED), abs=1e-4)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-3, 1e-2, 0.1, 0.3])

@@ -19,17 +19,13 @@ REST = [0.0] * 4
 DT = 0.005
 
 
-def random_limits(rng: np.random.Generator) -> tuple[float, float, float, float]:
-    distance, speed, acceleration, jerk = (10.0 ** rng.uniform(low, high) for low, high in SPANS)
-    return distance, speed, acceleration, jerk
-
-
 SPANS = ((-3.0, 1.0), (-1.0, 1.0), (-1.0, 1.5), (-1.0, 2.5))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_an_s_curve_ends_where_it_should_within_its_limits(seed: int) -> None:
-    distance, speed, acceleration, jerk = random_limits(np.random.default_rng(seed))
+    random = np.random.default_rng(seed)
+    distance, speed, acceleration, jerk = (10.0 ** random.uniform(low, high) for low, high in SPANS)
     curve = SCurve(distance, speed, acceleration, jerk)
     times = np.linspace(0.0, curve.duration, 8001)
     way, rate = np.array([curve.at(t) for t in times]).T

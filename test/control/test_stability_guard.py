@@ -14,7 +14,7 @@ from wam_control.force.contact_place import anywhere_sd
 from wam_control.force.force_loop import ForceCommand, ForceInput, ForceLoop, ForceLoopParameters
 from wam_control.force.force_loop_parameters import task_of
 from wam_control.force.sampled_loop import Feedback
-from wam_control.force.stability_guard import GuardedContact, GuardedForces, GuardedTask, StabilityGuard
+from wam_control.force.stability_guard import GuardedContact, GuardedForces, StabilityGuard
 from wam_control.velocity.servo_guard import ServoGuard
 from wam_control.velocity.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Servo, Timing
@@ -281,7 +281,7 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     assert seen.report.facts["pose of margin here"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
     assert f"each is multiplied by {factor:.3g}" in seen.report.message
     guard = StabilityGuard(ARM, SERVO, CLOCK, own.guard, own.sensing)
-    task = loop_task(loop)
+    task = task_of(loop.parameters)
     touch = GuardedContact(STIFF_POSE, "outer_link", 0.28, UNSURE, normal(guard, STIFF_POSE), 6.0)
     taken = replace(task.law, gain=tuple(factor * gain for gain in task.law.gain))
     share = own.guard.stability_fraction
@@ -300,10 +300,6 @@ def test_gains_far_above_their_margin_are_followed_where_the_guard_only_warns() 
     assert 0.0 < loop.supervision.assessment.scale < 0.01
     assert follow(loop, own.guard.posture, force=(0.0, 1.0, 0.0)) == 0.0
     assert loop.supervision.report.facts["gains multiplied by"] == "1"
-
-
-def loop_task(loop: ForceLoop) -> GuardedTask:
-    return task_of(loop.parameters)
 
 
 def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, float]:

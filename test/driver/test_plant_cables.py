@@ -324,10 +324,6 @@ def gripping(pretension: float, slack: bool = True) -> Plant:
     return plant_of(arm, slack=slack, tension_friction=(COEFFICIENT,))
 
 
-def sum_of_tensions(pretension: float, torque: float) -> float:
-    return max(2 * pretension, abs(torque) / PINION)
-
-
 TENSIONS = [
     (300.0, 0.0, True),
     (300.0, 5.0, True),
@@ -358,7 +354,7 @@ def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
     """Constant until a strand is slack, then growing; 0.1 %: the torque rises by 0.01 % a step."""
     plant = gripping_under_load(pretension, torque, slack)
     drive(plant, 0.1, [torque])
-    both = sum_of_tensions(pretension, torque if slack else 0.0)
+    both = max(2.0 * pretension, slack * abs(torque) / PINION)  # of the tensions
     expected = BASE + COEFFICIENT * both
     way = math.copysign(1.0, torque)
     excess, begin = 0.95 * expected, plant.theta[0]

@@ -11,7 +11,7 @@ from wam_description.event import OBEYED, Code, fault, warning
 from wam_description.rigid_body import RigidBody
 from wam_driver.driver import Driver, DriverParameters
 from wam_studies.force_benchmark.controllers import Admittance, TorqueControl
-from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
+from wam_studies.force_benchmark.outcome import TaskEnd, TaskTrace, evaluated
 from wam_studies.force_benchmark.study import GROUPINGS, ForceStudy
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, draw, steps, triple
@@ -215,14 +215,10 @@ def test_a_force_is_done_a_blind_one_refused_and_a_wrong_place_is_not_called_don
 STUDY = ForceStudy(CONFIGURATION)
 
 
-def result_of(task: Task) -> TaskResult:
-    """A result that follows from the task, without a simulation: 5 % too much."""
-    return evaluated(task, held(1.05 * task.force))
-
-
 def trials() -> list[ForceTrial]:
-    """Two hundred tasks with known failures: task 3 silent, task 4 above the limit, task 5 refused."""
-    found = [ForceTrial(7, number, task, result_of(task)) for number, task in enumerate(DRAWN[:200])]
+    """Two hundred tasks, each with 5 % too much; task 3 is silent, task 4 above the limit, task 5 refused."""
+    results = [evaluated(task, held(1.05 * task.force)) for task in DRAWN[:200]]
+    found = [ForceTrial(7, number, *each) for number, each in enumerate(zip(DRAWN, results, strict=False))]
     found[3] = found[3]._replace(result=evaluated(DRAWN[3], held(2.0 * DRAWN[3].force)))
     above = trace([4.0 * DRAWN[4].force] + [DRAWN[4].force] * 3000, impact=0.0)
     found[4] = found[4]._replace(result=evaluated(DRAWN[4], above))
