@@ -45,7 +45,7 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
     left_out = of - int(np.sum(kept))
     used = Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
     by_stamps, by_rows = (_roughness(at, values) for at in (stamps, np.arange(of)))
-    if by_stamps < by_rows:
+    if of == 1 or by_stamps < by_rows:
         return used
     packed = of * steps <= STREAM.pace * np.ptp(stamps)
     same = packed if np.count_nonzero(packed) > STREAM.repeated * of else same
