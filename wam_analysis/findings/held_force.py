@@ -158,9 +158,8 @@ def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:
     else:
         wrench = run.wrench("force_measured")
         if wrench is not None and np.any(wrench.force):  # an open loop measures none
-            rows = slice(*np.searchsorted(wrench.stamp_ns, [hold.begin, hold.end]))
-            stamps, along = wrench.stamp_ns[rows], wrench.force[rows] @ (hold.force / hold.commanded)
-            stamps, along = stamps[np.isfinite(along)], along[np.isfinite(along)]
+            along = wrench.force @ (hold.force / hold.commanded)
+            stamps, along = wrench.stamp_ns[np.isfinite(along)], along[np.isfinite(along)]
     during = (stamps >= hold.begin) & (stamps < hold.end)
     return (stamps[during] - hold.begin) / 1e9, along[during]
 

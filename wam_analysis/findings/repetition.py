@@ -67,9 +67,10 @@ def repetition_section(recording: AnalysedRecording) -> Section:
                     text += changes + ", not commanded" * (origin == LIMIT_CYCLE)
                     cycling[at + origin].append((cycle.peak_to_peak / LEAST[unit], text, label))
                 size = "from message to message" if cycle.alternates else "cycle, peak to peak"
+                findings.append(Finding(f"{name}: {size}", unit, cycle.peak_to_peak, note=origin, error=error))
+                if not cycle.alternates:
+                    findings.append(Finding(f"{name}: frequency", "Hz", frequency, note=origin))
                 findings += [
-                    Finding(f"{name}: {size}", unit, cycle.peak_to_peak, note=origin, error=error),
-                    *[Finding(f"{name}: frequency", "Hz", frequency, note=origin)][: not cycle.alternates],
                     Finding(f"{name}: begin", "s", begin),
                     Finding(f"{name}: end", "s", end),
                     Finding(f"{name}: confidence", "", cycle.confidence),

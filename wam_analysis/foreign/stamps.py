@@ -29,8 +29,10 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
     rows = np.flatnonzero(sent)
     rows = rows[np.argsort(clock[rows], kind="stable")]
     stamps = clock[rows]
+    if len(stamps) == 1:
+        return Timed(rows, stamps / 1e9, ())
     steps, of = np.diff(stamps), len(rows)
-    same = steps == 0
+    same, scatter = steps == 0, np.std(steps)
     known = np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1])[rows]
     numbers = np.nan_to_num(known)
     parts = (numbers - numbers[0]) / np.maximum(np.ptp(numbers, axis=0), STREAM.rounding)
@@ -39,17 +41,16 @@ def timed_messages(clock: Times, received: Times, columns: JointColumns | Wrench
     if np.any(ways) and _sends_changes(steps, ways):
         return Timed(rows, stamps / 1e9, (Treated(Treatment.ON_CHANGE, ""),))
     kept, what = np.append(True, ~same), Treatment.TWICE
-    if np.any(ways) and not np.any(same) and np.std(steps) > STREAM.pace * np.median(steps):
+    if np.any(ways) and not np.any(same) and scatter > STREAM.pace * np.median(steps):
         kept = ~np.all([held_over(column) for column in numbers.T if np.ptp(column)], axis=0)
         what = Treatment.RELAYED
     left_out = of - int(np.sum(kept))
     used = Timed(rows[kept], stamps[kept] / 1e9, (Treated(what, "", left_out, of),) * bool(left_out))
     by_stamps, by_rows = (_roughness(at, values) for at in (stamps, np.arange(of)))
-    if of == 1 or by_stamps < by_rows:
+    if by_stamps < by_rows:
         return used
     packed = of * steps <= STREAM.pace * np.ptp(stamps)
     same = packed if np.count_nonzero(packed) > STREAM.repeated * of else same
-    scatter = np.std(steps)
     lasts = np.flatnonzero(np.append(~same, True))
     period = np.ptp(stamps) / max(len(lasts) - 1, 1)
     if scatter > STREAM.irregular * period and np.std(np.diff(received[rows])) < SHAFT.much_better * scatter:

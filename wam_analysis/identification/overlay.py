@@ -76,7 +76,7 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     try:
         _ = configuration.with_values(values).shared.model_arm
     except ParameterError as error:
-        where = f", section '{SHARED}': "  # who reads it has set no value
+        where = f", section '{SHARED}': "  # left out: nobody has set these values
         reason = str(error).removeprefix(GIVEN + where).removeprefix(f"{configuration.path}{where}")
         return (
             f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "

@@ -153,7 +153,7 @@ class ForceLoop:
         """Take the present external torques as zero; '' or why they are not those of a free arm."""
         if self._run.axes:
             return "a force is commanded: end the command, and free the arm"
-        if self._measurement.rest.speed >= MOTION.at_rest:
+        if not self._measurement.rest.is_slow:
             # the mean speed of an arm that has stopped is that of an arm at rest after this time
             fastest = max(self._body.arm.joints.speed_limit)
             seconds = math.ceil(10.0 * FORCE.steady_time * math.log(fastest / MOTION.at_rest)) / 10.0
@@ -236,7 +236,7 @@ class ForceLoop:
         """Something else is commanded: what a free arm at rest measures is the error of its model."""
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
         before, still_sd, resting = self._run, measurement.torques.sd, np.zeros(len(self._velocity))
-        is_zeroed, rests = task is not None and bool(limit), is_free and measurement.rest.speed < MOTION.at_rest
+        is_zeroed, rests = task is not None and bool(limit), is_free and measurement.rest.is_slow
         has_left = is_zeroed and self._has_left
         if has_left:
             if rests:

@@ -49,13 +49,18 @@ class Rest:
         self.time, self.speed, self.torques = 0.0, math.inf, np.zeros(0)
         self._speeds, self._slow, self._slower = LowPass(), LowPass(), LowPass()
 
+    @property
+    def is_slow(self) -> bool:
+        """Whether no joint moves."""
+        return self.speed < MOTION.at_rest
+
     def step(self, torque: Array, joints: State, torque_sd: Array, dt: float) -> None:
         """Take the torques (n,), N m, of one period, and the standard deviation of each."""
         self.speed = max(map(abs, self._speeds.step(joints.velocity, FORCE.steady_time, dt)))
         self.torques = np.array(self._slow.step(torque.tolist(), FORCE.steady_time, dt))
         lasting = self._slower.step(self._slow.value, FORCE.friction_turn, dt)
         # brakes hold what is not measured
-        rests = self.speed < MOTION.at_rest and any(joints.effort)
+        rests = self.is_slow and any(joints.effort)
         is_steady = rests and bool(np.all(np.abs(self.torques - lasting) < FORCE.certain * torque_sd))
         self.time = self.time + dt if is_steady else 0.0
 
@@ -176,7 +181,7 @@ class ForceMeasurement:
 
         Without a load they are those of now, if it rests now.
         """
-        if self.rest.speed < MOTION.at_rest and not self._before.mass:
+        if self.rest.is_slow and not self._before.mass:
             return self.resting
         return self._before.at(self._body, self._q) - self._zeros
 
