@@ -39,7 +39,8 @@ class CommandProcess(subprocess.Popen[bytes]):
 
     def __init__(self, words: Sequence[str], place: Mapping[str, str] = MappingProxyType({}), **options: Any) -> None:
         environment = {**os.environ, PARENT: str(os.getpid()), **place}
-        command = [sys.executable, "-m", "wam_cli.program", *words]
+        # -P: the packages of this process, which are compiled, not those of a clone that is the working directory
+        command = [sys.executable, "-P", "-m", "wam_cli.program", *words]
         super().__init__(command, start_new_session=True, env=environment, **options)
 
     def has_ended(self, seconds: float) -> bool:

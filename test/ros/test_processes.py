@@ -156,6 +156,7 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
 @pytest.fixture
 def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Processes:
     """A recorder as a process, with a bag that is open."""
+    (tmp_path / "wam_cli.py").touch()  # no process takes a module from there
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end=0.2, end_reports=0.2))
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
