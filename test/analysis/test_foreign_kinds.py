@@ -293,8 +293,8 @@ def called_as_commands() -> list[Case]:
     parts = [*MAPPED.fields.items(), ("command.position", "state.effort")]
     sent = topic_map(["/state"], [], [], [f"{quantity}={path}" for quantity, path in parts], [])
     return [
-        Case("in the same message", by_json, one("/state", 100.0, 0.7, 0.5), {}, "", sent,
-             ("Taken as commands: /state command.", "a position: a gain and a delay do not explain")),
+        Case("in the same message", by_json, one("/state", 100.0, 0.7, 0.5), {},
+             "a position: a gain and a delay do not explain", sent, ("Taken as commands: /state command.",)),
         Case("target", by_rosbags, one("/target/joint_states", 100.0, 0.7, 0.5), expected),
         Case("desired", sqlite, one("/arm_desired/desired", 200.0, 0.7, 0.5), expected),
         Case("goal", ros1, one("/goal/ref", 125.0, 0.7, 0.5), expected, "", named),
@@ -352,7 +352,7 @@ def follows() -> list[Case]:
         Case("a stream by another clock", sqlite, [s._replace(stamp=s.stamp + 20.0 * (s.topic == "/t"))
              for s in streamed], {"a position: delay": 0.1, "a position: gain": 1.0}, "/t: stamps 20 s ahead"),
         Case("away", ros1, joint(path(time), path(np.maximum(time - 0.8, 0.0))), {"a position: delay": 0.8}, "", to),
-        Case("before", ros1, joint(path(time), path(time + 0.3)), {}, "", to, ("a gain and a delay do not explain",)),
+        Case("before", ros1, joint(path(time), path(time + 0.3)), {}, "a gain and a delay do not explain", to),
         Case("by two periods", sqlite, locked, {"a position: delay": 0.01585, "a position: gain": 1.0}, "", to),
         *(Case(f"a clock {by:g} s off", sqlite, [s._replace(stamp=s.stamp + by * (s.topic == topic))
                for s in joint(path(time), path(time - 0.03))], {"a position: delay": 0.03 - min(by, 0.0)}, told, to)
@@ -367,6 +367,11 @@ def follows() -> list[Case]:
         Case("grows", by_rosbags, joint(steps, grows), {}, "position, 0.5 rad at 7.0 s: it DIVERGES", to),
         Case("hunts", ros1, joint(steps, quick + 0.004 * np.sin(9.0 * np.maximum(time - 1.0, 0.0))),
              {"a: frequency": 4.5 / math.pi, "a: cycle, peak to peak": 0.008}, "", to),
+        Case("pushed", ros1, joint(path(time), path(time - 0.03) + 0.3 * (time // 4.0 == 2.0)), {}, " error is", to),
+        Case("connects", sqlite, joint(path(time), path(time - 0.03) + 0.4 * (time < 1.0)), {"a position: delay": 0.03},
+             "the zero of the position moves once", to, ("with a gain of 1; the largest",)),
+        Case("a rate", sqlite, joints("/js", time, ["a"], position=path(time - 0.05)[:, None]) + joints(
+            "/cmd", time, ["a"], velocity=np.gradient(path(time), time)[:, None]), {"a velocity: delay": 0.05}, "", to),
         Case("at its end", sqlite, joint(0.1 + 0.2 * (time > 20.99), 0.1 + 0.0 * time), {}, "", to),
         Case("does not", sqlite, joint(steps, 0.0 * steps), {}, "a position: it was commanded to move, and never", to),
         Case("stops, late", sqlite, joint(stops, np.interp(time - 0.2, time, stops), 2), {}, "", to, (" as rest.",)),

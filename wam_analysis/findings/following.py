@@ -8,7 +8,7 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.force import SWINGS_ON, fate_words
 from wam_analysis.findings.force_steps import force_steps, steady_error, worst
 from wam_analysis.findings.repetition import LEAST
-from wam_analysis.foreign.pieces import resolution, rests
+from wam_analysis.foreign.pieces import pieces, resolution, rests
 from wam_analysis.foreign.source import AXES, Source
 from wam_analysis.held_messages import value_changes
 from wam_analysis.measures.following import Following, following
@@ -23,10 +23,11 @@ def following_section(recording: AnalysedRecording) -> Section | None:
     for one in recording.states:
         if (command := recording.command_of(one)) is None:
             continue
-        quantities = [q for q in (*JOINT_FIELDS, *AXES) if q in command.values and q in one.values]
+        own = one if command.values.keys() & one.values.keys() else _with_rate(one)
+        quantities = [q for q in (*JOINT_FIELDS, *AXES) if q in command.values and q in own.values]
         for quantity in quantities[: 1 if one.is_joint else len(AXES)]:
             name, unit = f"{one.label} {quantity}", one.units[quantity]
-            measured, wanted = one.only(quantity), command.only(quantity)
+            measured, wanted = own.only(quantity), command.only(quantity)
             found, steps = _following(measured, wanted), force_steps(measured, wanted) if one.is_joint else []
             numbers, remarks = dict[str, tuple[float, str]](), list[str]()
             if rests(measured) and _moves(measured, wanted):
@@ -34,7 +35,8 @@ def following_section(recording: AnalysedRecording) -> Section | None:
             if found:
                 remarks.append(_words(found, unit))
                 numbers |= {"error, rms": (found.rms, unit), "largest error": (found.largest, unit)}
-            if found and found.unexplained < SHAFT.agree:
+            is_like = found is None or math.isfinite(found.gain)
+            if found and is_like:
                 numbers |= {"gain": (found.gain, ""), "delay": (found.delay, "s"), "offset": (found.offset, unit)}
                 numbers |= {"play": (found.play, unit)} if found.play else {}
             if steps:
@@ -52,7 +54,7 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                     for step in steps
                     if step.swings.verdict in SWINGS_ON
                 ]
-            sentences += [f"{name}: {'; '.join(remarks)}."] if remarks else []
+            (sentences if is_like else wrong).extend([f"{name}: {'; '.join(remarks)}."] * bool(remarks))
             findings += [Finding(f"{name}: {what}", of, value) for what, (value, of) in numbers.items()]
     stated = [*sentences, *wrong]
     return Section("following", "Commands", stated, findings, sentences, wrong) if stated else None
@@ -60,14 +62,24 @@ def following_section(recording: AnalysedRecording) -> Section | None:
 
 def _words(found: Following, unit: str) -> str:
     """How a quantity follows, in words."""
-    error = f"the largest error is {shown(found.largest, unit)}"
-    if not found.unexplained < SHAFT.agree:
-        left = shown(100.0 * found.unexplained, "%")
-        return f"a gain and a delay do not explain {left} of how it follows its command; {error}"
+    error = f"the largest error is {shown(found.largest, unit)} at {found.at:.1f} s"
+    if math.isnan(found.gain):
+        return (
+            f"a gain and a delay do not explain {shown(100.0 * found.unexplained, '%')} of how it follows its command; "
+            f"{error}"
+        )
     play = f" and a play of {shown(found.play, unit)}" * bool(found.play)
     off = f", and is off by {shown(found.offset, unit)}" * (abs(found.offset) > SHAFT.agree * found.largest)
     when = f"{shown(abs(found.delay), 's')} {'after' if found.delay >= 0.0 else 'before'} its command"
     return f"follows {when}, with a gain of {shown(found.gain)}{play}{off}; {error}"
+
+
+def _with_rate(one: Source) -> Source:
+    """A joint with the rate of its position, where only a velocity may have been commanded."""
+    if not (some := pieces(one, "position")):
+        return one
+    time, rate = np.hstack([(piece.time, piece.values["velocity"]) for piece in some])
+    return one._replace(time=time, values={"velocity": rate})
 
 
 def _moves(measured: Source, command: Source) -> bool:

@@ -47,7 +47,8 @@ def stick_section(recording: AnalysedRecording) -> Section:
                 sentence += f"; slower than {shown(found.slowest)} {one.units['position']}/s, its noise, counts as rest"
         if found.commanded > SHAFT.disobeyed and 100.0 * found.stuck > SHAFT.turning:
             sentence += (
-                f"; it sticks or has play: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
+                f"; it sticks, is stopped or has play: {100.0 * found.commanded:.0f} % of its time at rest it was "
+                "commanded to move"
             )
             verdict.append(f"{one.label}: {sentence}.")
         alike[sentence].append(one.label)
@@ -223,6 +224,6 @@ def _lost_way(piece: Piece, unit: str) -> str:
     worst = int(np.argmax(excess))
     return (
         f"in the {SHAFT.way:g} s from {time[worst]:.4g} s, the position changes by {shown(moved[worst], unit)}, the "
-        f"integral of the velocity by {shown(by[worst], unit)}; an encoder slips or stops, or one of the two is of "
-        "something else"
+        f"integral of the velocity by {shown(by[worst], unit)}; an encoder slips or stops, the velocity is late, or "
+        "one of the two is of something else"
     )

@@ -94,7 +94,8 @@ def _without_jumps(one: Source) -> Source:
     comes_back = abs(np.sum(sizes)) < SHAFT.much_better * np.sum(np.abs(sizes))
     if not len(sizes) or ("velocity" not in one.values and comes_back):
         return one
-    position = one.values["position"] - np.cumsum(moves)[row_at(at, one.time)]
+    zero = np.cumsum(moves)[row_at(at, one.time)]
+    position = one.values["position"] - zero + np.sort(zero)[len(zero) // 2]  # that of most messages is kept
     if "velocity" in one.values or not rests(one._replace(values={"position": position})):
         treated = Treated(Treatment.MOVED_ZERO, "position", len(sizes), size=max(sizes, key=abs))
         return one.with_values({"position": position}, treated)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.measures.runs import median_step
+from wam_analysis.measures.runs import median_step, noise
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
 
@@ -19,7 +19,9 @@ class Following(NamedTuple):
     Attributes
     ----------
     rms, largest : error, in the unit of the signal.
-    gain, delay : what moves of the signal is `gain` times that of the command of `delay` s before.
+    at : s, when it is largest.
+    gain, delay : what moves of the signal is `gain` times that of the command of `delay` s before; NaN where that does
+        not explain the motion, or little of the error, as where something else moved it for a while.
     offset : mean of the signal less that of this command.
     play : by which the command moves after it turned until the signal does, 0 where that does not show.
     unexplained : rms of what these leave, over that of the motion.
@@ -27,6 +29,7 @@ class Following(NamedTuple):
 
     rms: float
     largest: float
+    at: float
     gain: float
     delay: float
     offset: float
@@ -56,7 +59,8 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
     """
     paths = [(stamps, sent), (np.repeat(stamps, 2)[1:], np.repeat(sent, 2)[:-1])]
     error = min((value - np.interp(time, *path) for path in paths), key=lambda one: float(one @ one))
-    rms, largest = math.sqrt(np.mean(error**2)), float(np.max(np.abs(error)))
+    rms, worst = math.sqrt(np.mean(error**2)), int(np.argmax(np.abs(error)))
+    largest, at = float(np.abs(error[worst])), float(time[worst])
     steps = np.sort(np.diff(stamps))
     usual = float(steps[np.searchsorted(np.cumsum(steps), 0.5 * np.sum(steps))])  # for half of the time
     shows_steps = STREAM.changes * median_step(time) < usual
@@ -70,12 +74,14 @@ def following(time: Numbers, value: Numbers, stamps: Numbers, sent: Numbers) -> 
 
     low, high = 0.0, 2.0 * largest / max(abs(fit.gain), 1.0)
     for _ in range(CYCLE.sections):
-        at = [low + share * (high - low) for share in GOLDEN]
-        low, high = (low, at[1]) if with_play(at[0]) < with_play(at[1]) else (at[0], high)
+        plays = [low + share * (high - low) for share in GOLDEN]
+        low, high = (low, plays[1]) if with_play(plays[0]) < with_play(plays[1]) else (plays[0], high)
     play = 0.5 * (low + high)
     loose = with_play(play)
     fit, play = (loose, play) if loose.rest < SHAFT.much_better * fit.rest else (fit, 0.0)
-    return Following(rms, largest, fit.gain, fit.delay, fit.offset, play, fit.rest / motion)
+    most = math.hypot(noise(value), max(SHAFT.much_better * rms, SHAFT.late * motion))
+    gain = fit.gain if fit.rest < min(SHAFT.agree * motion, most) else math.nan
+    return Following(rms, largest, at, gain, fit.delay, fit.offset, play, fit.rest / motion)
 
 
 def _played(path: Numbers, play: float) -> Numbers:
