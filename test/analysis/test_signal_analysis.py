@@ -353,8 +353,7 @@ def test_a_swept_frequency_is_no_cycle(rate):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("decay", "frequency", "count"), [
-    (1.5, 6.0, 0), (5.0, 6.0, 0), (-5.0, 6.0, 1), (-10.0, 2.0, 1),
-])  # fmt: skip
+    (1.5, 6.0, 0), (5.0, 6.0, 0), (-5.0, 6.0, 1), (-10.0, 2.0, 1), (0.6, 12.0, 0), (-0.6, 12.0, 1)])  # fmt: skip
 def test_what_decays_in_a_part_of_a_recording_is_no_cycle_and_what_grows_is_said_to(decay, frequency, count):
     time = np.arange(10000) / 250.0
     size = np.where(time > 6.0, np.exp(-(time - (6.0 if decay > 0.0 else 40.0)) / decay), 0.0)

@@ -62,7 +62,7 @@ def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             rows = slice(begin, begin + length)
             if np.any(longest[rows] < length):
                 continue
-            cycle = _cycle(time[rows], value[rows], least) or _cycle(time[rows], level[rows], least)
+            cycle = _cycle(time[rows], value[rows], least) or _cycle(time[rows], level[rows], least, changes=True)
             if cycle is None:
                 continue
             flat = without_drift(time, value, cycle.period)
@@ -90,7 +90,7 @@ def _in_windows(time: Numbers, value: Numbers, least: float) -> list[Episode]:
                     found.append(Episode(float(time[first]), float(time[last - 1]), changing))
                 transients.append(_Transient(first, last, cycle.period, _width(time, cycle.period)))
                 lag = 0.0  # its last part is no limit cycle
-            elif better is None and cycle.cycles < 4 * CYCLE.episode_cycles:
+            elif better is None and (cycle.cycles < 4 * CYCLE.episode_cycles or cycle.confidence < CYCLE.sure):
                 continue
             else:
                 if better is None or (most < math.inf and last - first < length):  # it is in all of the window
@@ -116,13 +116,16 @@ class _Transient(NamedTuple):
         return is_next and is_alike and min(cycle.growth, 1.0 / cycle.growth) < CYCLE.steady
 
 
-def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan) -> LimitCycle | None:
-    """The cycle of a window, None where none is sure."""
+def _cycle(
+    time: Numbers, value: Numbers, least: float, period: float = math.nan, changes: bool = False
+) -> LimitCycle | None:
+    """The cycle of a window, None where none is sure; its size may change."""
     if not np.ptp(value) > least:
         return None
     cycle = limit_cycle(time, value, period)
     is_enough = (1.0 + CYCLE.same_period) * cycle.cycles >= CYCLE.episode_cycles
-    return cycle if cycle.confidence >= CYCLE.sure and is_enough and cycle.peak_to_peak > least else None
+    sure = cycle.explained if changes else cycle.confidence
+    return cycle if sure >= CYCLE.sure and is_enough and cycle.peak_to_peak > least else None
 
 
 def _width(time: Numbers, period: float) -> int:
