@@ -135,7 +135,18 @@ class McapWriter:
         self.flush()
         end = serialized(records.DataEnd(self._crc))
         summary_start = self.position + len(end)
-        self._groups[Opcode.STATISTICS] = bytearray(serialized(self._statistics()))
+        statistics = records.Statistics(
+            attachment_count=self._numbers[Opcode.ATTACHMENT_INDEX],
+            channel_count=self._numbers[Opcode.CHANNEL],
+            channel_message_counts=dict(sorted(self.counts.by_channel.items())),
+            chunk_count=self._numbers[Opcode.CHUNK_INDEX],
+            message_count=self.counts.by_channel.total(),
+            message_end_time=self.counts.last,
+            message_start_time=self.counts.first,
+            metadata_count=self._numbers[Opcode.METADATA_INDEX],
+            schema_count=self._numbers[Opcode.SCHEMA],
+        )
+        self._groups[Opcode.STATISTICS] = bytearray(serialized(statistics))
         body, offsets = b"", b""
         for opcode, group in self._groups.items():
             if group:
@@ -148,19 +159,6 @@ class McapWriter:
     def _summarize(self, opcode: Opcode, record: records.McapRecord) -> None:
         self._groups[opcode] += serialized(record)
         self._numbers[opcode] += 1
-
-    def _statistics(self) -> records.Statistics:
-        return records.Statistics(
-            attachment_count=self._numbers[Opcode.ATTACHMENT_INDEX],
-            channel_count=self._numbers[Opcode.CHANNEL],
-            channel_message_counts=dict(sorted(self.counts.by_channel.items())),
-            chunk_count=self._numbers[Opcode.CHUNK_INDEX],
-            message_count=self.counts.by_channel.total(),
-            message_end_time=self.counts.last,
-            message_start_time=self.counts.first,
-            metadata_count=self._numbers[Opcode.METADATA_INDEX],
-            schema_count=self._numbers[Opcode.SCHEMA],
-        )
 
     def _put(self, data: bytes) -> None:
         """Write all or nothing."""

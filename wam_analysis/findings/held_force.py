@@ -1,7 +1,7 @@
 """Each commanded force: how it was reached and held, whether it settles, and what theory predicts for it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -275,7 +275,9 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
         return Theory()
     loop, predicted = parameters.force_loop, Predicted()
     if loop is not None and loop.mode == "hybrid":
-        gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
+        share = (hold.force / float(np.linalg.norm(hold.force))) ** 2  # of each axis
+        gains = (loop.force_gain, loop.force_proportional_gain)  # of each, or one for all
+        gain, proportional = (float(np.broadcast_to(each, 3) @ share) for each in gains)
         predicted = predict(node, gain, proportional)
     found = guarded(parameters, press, node.contact_stiffness)
     moved, seen = math.nan, one.swinging
@@ -284,9 +286,3 @@ def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce
         ratio = abs(dict(zip(arm.motors.names, turned.tolist(), strict=True)).get(seen.shaft, 0.0))
         moved = seen.swings.peak_to_peak / ratio if ratio else math.nan
     return Theory(predicted, found, moved)
-
-
-def _along(gains: Sequence[float], force: Numbers) -> float:
-    """Gain of the axes x y z, or one for all, in the direction of a force."""
-    share = (force / float(np.linalg.norm(force))) ** 2
-    return float(np.broadcast_to(gains, 3) @ share)

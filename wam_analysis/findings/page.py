@@ -6,7 +6,7 @@ import html
 from collections.abc import Iterable, Sequence
 
 from wam_analysis.findings.analysis import Analysis
-from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
+from wam_analysis.findings.charts import FIRST, SIGNALS, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section
 from wam_analysis.findings.plots import arm_plot
 from wam_analysis.findings.tabulated import MARK, Table, legends, tabulated
@@ -84,9 +84,15 @@ def page(analysis: Analysis) -> str:
         HTML with its styles, scripts and pictures; it makes no request.
     """
     drawn = list(charts(analysis))
-    figures = [(chart.section, _chart(i, chart)) for i, chart in enumerate(drawn)]
+    figures = []
+    for i, chart in enumerate(drawn):
+        text = f"{html.escape(chart.title)} Drag to zoom, double click to see all."
+        drawing = f'<figure class="chart" data-chart="{i}"><div></div><figcaption>{text}</figcaption></figure>'
+        figures.append((chart.section, drawing))
     if (arm := arm_plot(analysis.recording)) is not None:
-        figures.insert(0, (FIRST, _arm(*arm)))
+        text, picture = html.escape(arm[0]), f"data:image/svg+xml;base64,{base64.b64encode(arm[1]).decode()}"
+        drawing = f'<figure class="arm"><img alt="{text}" src="{picture}"><figcaption>{text}</figcaption></figure>'
+        figures.insert(0, (FIRST, drawing))
     name = analysis.recording.bag.path.name
     last = Section(SIGNALS, "Signals", (), ())
     shown_last = any(section == SIGNALS for section, _ in figures)
@@ -97,7 +103,8 @@ def page(analysis: Analysis) -> str:
     )
     library, script, styles = scripts()
     run = (library, script) if drawn else ()
-    allowed = " ".join(f"'sha256-{_digest(text)}'" for text in run) or "'none'"
+    digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in run)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
     return (
         "<!doctype html>\n"
         '<html lang="en"><head><meta charset="utf-8">'
@@ -111,10 +118,6 @@ def page(analysis: Analysis) -> str:
     )
 
 
-def _digest(text: str) -> str:
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
 def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
     sentences = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in section.sentences)
     figures = "".join(figure for key, figure in drawn if key == section.key)
@@ -124,16 +127,6 @@ def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
         f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2><ul>{sentences}</ul>'
         f"{tables}{_notes(section.findings)}{figures}</section>"
     )
-
-
-def _arm(title: str, picture: bytes) -> str:
-    text, source = html.escape(title), f"data:image/svg+xml;base64,{base64.b64encode(picture).decode()}"
-    return f'<figure class="arm"><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
-
-
-def _chart(number: int, chart: Chart) -> str:
-    caption = f"{html.escape(chart.title)} Drag to zoom, double click to see all."
-    return f'<figure class="chart" data-chart="{number}"><div></div><figcaption>{caption}</figcaption></figure>'
 
 
 def _table(table: Table) -> str:

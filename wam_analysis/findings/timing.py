@@ -1,7 +1,7 @@
 """Section about the timing of the loop, and the provenance of the recording."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -54,12 +54,6 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
         yield name, stamp, None if is_table else received, math.nan, not first.is_command
 
 
-def _silences(name: str, parts: Mapping[str, int], least: float) -> list[str]:
-    """Parts of a recording, ns, that a topic lacks, if they are longer than that, s."""
-    found = {part: shown(of / 1e9, "s") for part, of in parts.items() if of / 1e9 > least}
-    return [f"{name}: no message in the {part} {seconds} of the recording." for part, seconds in found.items()]
-
-
 def timing_section(recording: AnalysedRecording) -> Section:
     """Periods, jitter, latency and missed periods, from stamps and reception times."""
     findings, wrong = [], []
@@ -107,7 +101,11 @@ def timing_section(recording: AnalysedRecording) -> Section:
             wrong.append(f"{name}: {what}; longest gap: {shown(gap, 's')} from {begin:.2f} s.")
         if should_last and lost >= 0.0:
             least = max(STREAM.reset / 1e9, STREAM.filled * period)
-            wrong += _silences(name, {"first": stamp[0] - first, "last": last - stamp[-1]}, least)
+            wrong += [
+                f"{name}: no message in the {part} {shown(of, 's')} of the recording."
+                for part, of in (("first", (stamp[0] - first) / 1e9), ("last", (last - stamp[-1]) / 1e9))
+                if of > least
+            ]
     silent = "No message is missing." if findings else "No stamped topic has a period."
     sentences = wrong or [silent] * (recording.is_foreign or not findings)  # ours lists what is lost
     if timed := [facts for facts in recording.loop if RATE in facts]:

@@ -117,7 +117,8 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     """
     sought = unknowns(shared)
     regressor = Regressor(shared, sought, motion, IDENTIFY.least_motion)
-    still = _still(shared, regressor)
+    moves, matrix = regressor.is_used.any(0), shared.arm.transmission.joint_from_motor
+    still = [j for j, row in enumerate(matrix) if not moves[row != 0.0].all()]  # their torques are not seen
     if len(still) == shared.arm.n:
         raise ValueError(
             f"no joint turns freely for {IDENTIFY.least_motion:g} s: let each motor turn, faster than "
@@ -130,12 +131,6 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     uncertainty = _uncertainty(regressor, best)
     tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
     return _result(sought, best, uncertainty, tracked)
-
-
-def _still(shared: Shared, regressor: Regressor) -> list[int]:
-    """Joints of which a motor does not move enough to show their torques."""
-    moves, matrix = regressor.is_used.any(0), shared.arm.transmission.joint_from_motor
-    return [j for j, row in enumerate(matrix) if not moves[row != 0.0].all()]
 
 
 def _estimate(regressor: Regressor) -> _Estimate:

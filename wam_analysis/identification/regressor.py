@@ -65,16 +65,12 @@ class Regressor:
         rest = np.zeros(qd.shape[1])
         self._weights = np.array([body.inverse_dynamics_regressor(each, rest, rest) for each in q])
         self._carried = (qdd * shared.model.joints.armature) @ self._matrix
-        steady = self._steady()
-        self.is_used = steady & (steady.sum(0) * float(np.median(np.diff(motion.time))) >= least)
-
-    def _steady(self) -> Mask:
-        """(k, n), whether a motor and its joints turn in one direction during the window."""
-        motor, joint = (
-            (each.min(1) > least) | (each.max(1) < -least)
-            for each, least in ((self._motion.velocities, IDENTIFY.slowest_motor), (self._qd, IDENTIFY.slowest_joint))
+        motor, joint = (  # in one direction during the window
+            (each.min(1) > slowest) | (each.max(1) < -slowest)
+            for each, slowest in ((motion.velocities, IDENTIFY.slowest_motor), (self._qd, IDENTIFY.slowest_joint))
         )
-        return motor & ~(~joint @ (self._matrix != 0.0))
+        steady = motor & ~(~joint @ (self._matrix != 0.0))
+        self.is_used = steady & (steady.sum(0) * float(np.median(np.diff(motion.time))) >= least)
 
     def equations(self, values: Numbers) -> Equations:
         """The equations about the values, (p,), of the parameters."""
