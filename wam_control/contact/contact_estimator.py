@@ -135,7 +135,7 @@ class ContactEstimator:
         self._ended = -math.inf  # by the age of the observer, s
         # of the estimates at the last two ages: age of the observer, s, and torques, N m
         none: tuple[float, Array | None] = 0.0, None
-        self._before, self._last = none, none
+        self._before = self._last = none
         self._inference.fusion.reset()
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:

@@ -94,7 +94,7 @@ class ErrorEffects:
         self._errors = np.hstack((-through * levels, through * levels, -np.eye(n), -np.eye(n), -through))
         # with the model, the constants were identified that motors have in common that move the same joints
         driven = self._from_motors != 0.0
-        common = (driven.T.astype(float) @ driven > 0.0).astype(float) * side.is_identified
+        common = driven.T @ driven * friction.is_identified
         self._differs = np.eye(n) - common / np.maximum(1.0, common.sum(axis=1))
         self._to_joints = inverse.T
 

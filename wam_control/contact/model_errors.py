@@ -95,7 +95,7 @@ class ModelErrors:
         self.beyond = self._beyond()
         self._waiting: deque[Observation] = deque()
         self._pose = _Pose(np.full(len(through), np.inf))
-        self._since = self._contact = self._hold = 0.0
+        self.reset()
 
     @property
     def by_name(self) -> dict[str, TrackedError]:

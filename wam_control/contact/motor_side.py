@@ -62,7 +62,6 @@ class MotorSide:
     parameters, has_dither : as given.
     map : between motors and joints.
     velocity : of the motors.
-    is_identified : whether the model is that of a recording.
     friction : of motors, then joints.
     rotors, pulleys : (n, n), their inertia at the joints, kg m^2.
     """
@@ -71,7 +70,6 @@ class MotorSide:
         self.map = arm.transmission
         self._squared = np.square(self.map.joint_from_motor)
         self.rotors, self.pulleys, self._stiffness = arm.rotors, arm.pulleys, arm.stiffness
-        self.is_identified = model is not None and model.is_identified
         self.friction = ShaftFriction(arm, parameters, model)
         self.velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
         self.parameters, self.has_dither = parameters, has_dither

@@ -59,6 +59,7 @@ class ShaftFriction:
     Attributes
     ----------
     dynamic, static : (n,), N m, nominal F_d and F_s.
+    is_identified : whether the model is that of a recording.
     """
 
     def __init__(self, arm: Arm, parameters: ObserverParameters, model: ArmModel | None) -> None:
@@ -71,9 +72,9 @@ class ShaftFriction:
         self._stribeck = CONTACT.usual_stribeck * self._rest_velocity
         if model is not None:
             self._stribeck = np.array([*model.motors.stribeck_velocity, *model.joints.stribeck_velocity])
-        is_identified = model is not None and model.is_identified
-        self._slow = self._stribeck * CONTACT.slow * (1.0 if is_identified else CONTACT.assumed_stribeck)
-        self._rise = self.static - self.dynamic if is_identified else None
+        self.is_identified = model is not None and model.is_identified
+        self._slow = self._stribeck * CONTACT.slow * (1.0 if self.is_identified else CONTACT.assumed_stribeck)
+        self._rise = self.is_identified * (self.static - self.dynamic)
         self._per_distance = np.outer(1.0 / self._rest_velocity, np.exp(-LOG_DISTANCES))
         self._rest = self._rest_velocity
         # numpy takes arrays of one shape several times faster than it broadcasts them
@@ -105,10 +106,8 @@ class ShaftFriction:
         self._sliding = way + (remembered * self._sliding - way) * left
         self._resting = np.maximum(left * self._resting, (1.0 - moving * moving)[each])
         sliding = self._sliding.dot(EQUAL)
-        level = self.dynamic
-        if self._rise is not None:
-            turned = velocity / self._stribeck
-            level = level + self._rise * np.exp(-turned * turned)
+        turned = velocity / self._stribeck
+        level = self.dynamic + self._rise * np.exp(-turned * turned)
         return ShaftMotion(
             level * sliding + self._viscous * velocity,
             self._sliding,
