@@ -93,8 +93,7 @@ class RequestQueue:
                     f"waiting for the service {client.srv_name}, which no node offers; start the node '{request.node}' "
                     "that offers it, or let this node request another service"
                 )
-            # before, the request would be lost; a timer that is late may be called twice, see `Connection`
-            if client.service_is_ready() and timer in self._node.timers:
+            if client.service_is_ready():  # before, the request would be lost
                 timer.cancel()
                 self._node.destroy_timer(timer)
                 client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result()))

@@ -133,6 +133,7 @@ class Connection(Closing):
         self.listener_gone = False
         self.nodes: dict[str, Any] = {}
         self._nodes: dict[Node, str] = {}  # and their names, which a destroyed node does not have
+        self._looked = time.monotonic()
         self._pulse_end = threading.Event()
         self._pulse = threading.Thread(target=self._keep_awake, name="pulse", daemon=True)
         self._pulse.start()
@@ -145,10 +146,14 @@ class Connection(Closing):
                 task = self.executor.create_task(self._call_overdue)
 
     def _call_overdue(self) -> None:
-        """Call the timers that were due before the last pulse, and begin their waits again: each has one of its own."""
+        """Call the timers that were due before the last look, and begin their waits again: each has one of its own.
+
+        One whose wait has ended, but late, has been called since: the executor does in turn what it has to do.
+        """
+        before, self._looked = self._looked, time.monotonic()
         for node in self._nodes:
             for timer in node.timers:
-                if not timer.is_canceled() and timer.time_until_next_call() < -PROCESS_LIMITS.pulse * SECOND:
+                if not timer.is_canceled() and timer.time_until_next_call() < (before - self._looked) * SECOND:
                     timer.reset()
                     self.executor.create_task(timer.callback)
 

@@ -140,7 +140,6 @@ def test_a_signal_is_handled_between_two_callbacks(domain_id: int, capfd: pytest
 def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another_node(
     ros: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`wam bag record` needs them, and a real driver need not have them."""
     monkeypatch.setattr("wam_ros.client.CALL_LIMITS", replace(CALL_LIMITS, answer=LONG))
     driver = ros.node("driver")
     driver.declare_parameter("serial", "WAM7")
@@ -218,7 +217,6 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
 def test_a_topic_on_which_nothing_comes_ends_in_time_with_the_reason(
     before: str, words: str, why: str, stack: None
 ) -> None:
-    """The search for a topic took 10 s, whatever the timeout."""
     assert called(before)[0] == 0
     code, out, err = called("echo", *words.split(), "--timeout", "3")
     assert called("resume")[0] == 0

@@ -83,7 +83,6 @@ def test_it_fails_where_the_arm_stops_under_it(mode: str, fault: str, text: str,
 
 
 def test_it_fails_with_the_reason_where_its_force_is_refused(stub: Stub) -> None:
-    """What the force loop refuses is not measured as if it had been pressed."""
     stub.ros.wait(lambda: stub.forces and stub.forces[-1] == -5.0, what="a commanded force")
     reason = "the force is measured with a standard deviation of 3 N; bend the arm"
     stub.report("force_loop", Level.WARN, reason, refused="force_command", reaction="refused")

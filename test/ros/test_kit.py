@@ -147,7 +147,6 @@ def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
 def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_takes_its_topic(
     taker: str, topic: str, stamp: int, text: str, fields: dict[str, Any], arm: RunningArm
 ) -> None:
-    """The node says why and goes on; a thousand axes took seconds, in which nobody answered an emergency stop."""
     arm.start(nodes=INNER if taker == "transform" else ())
     arm.enable()
     arm.run(1.0)
@@ -314,7 +313,6 @@ def test_nested_values_and_a_class_in_the_place_of_a_node_make_a_configuration()
 def test_after_a_failed_test_the_next_one_runs_and_workers_do_not_meet(
     pytester: pytest.Pytester, domain_id: int
 ) -> None:
-    """A user's project: the plugin by its name, as the entry point loads it; two workers at once."""
     pytester.makepyfile(
         """
         import pytest

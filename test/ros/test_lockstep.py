@@ -83,7 +83,6 @@ def test_lockstep_over_topics_equals_the_loop_without_ros(delay: int, dither_cyc
 
 @pytest.mark.slow
 def test_one_period_of_delay_changes_the_numbers(tmp_path: Path) -> None:
-    """The comparison above would notice an outer command that is used a period too late."""
     runs = [play_directly(playing(STEPS, tmp_path, timing={"outer_delay": delay})) for delay in (0, 1)]
     assert runs[0].rows["motor_states"] != runs[1].rows["motor_states"]
 
@@ -159,7 +158,6 @@ def test_a_node_that_begins_late_leaves_out_the_steps_whose_inputs_it_has_missed
 
 
 def test_a_step_waits_fifty_periods_for_the_answer_to_an_earlier_state_and_then_does_without() -> None:
-    """Two nodes that wait for each other, of which one has missed a state, go on."""
     synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=5)})
     late = [((11 + i) * MS, 0.001, "s", "c1") for i in range(5)]
     expected = {10: [(10 * MS, 0.001, "s", "c1")], 56: [], 57: late}

@@ -227,7 +227,6 @@ class Slow:
 def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
     ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It reports itself while it computes: from the process of transform to that of the velocity loop."""
     stack = Stack(ros, tmp_path, "realtime")
     slow = make(ros, tmp_path, f"{__name__}:Slow", "/wam", changed([*SIX, f"{__name__}:Slow"], timing__mode="realtime"))
     published = slow.outlets.written

@@ -107,7 +107,6 @@ def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
 def test_a_topic_of_its_own_that_cannot_be_is_refused_with_what_is_allowed(
     row: Topic, text: str, configured: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At the declaration, so in a direct run and over topics alike."""
 
     class Other(Echo):
         topics = (row,)
@@ -421,7 +420,6 @@ def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(
 @pytest.mark.slow
 @pytest.mark.parametrize("steps", [0, 50, 300])
 def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(steps: int) -> None:
-    """The nodes that wait for it refuse what the others send, and the driver brakes, as over topics."""
     wam = Configuration.load(packaged("wam"))
     silent = silent_after(declared("gravity").node, steps)
     plan = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("wait", 2.0)]

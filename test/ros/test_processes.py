@@ -353,7 +353,6 @@ def test_signals_while_a_program_ends_do_not_change_how_it_ends(program: str, ro
 
 @pytest.mark.parametrize("home", [None, "/dev/null", "/proc"], ids=["unset", "not a directory", "read-only"])
 def test_without_a_home_to_write_to_the_log_is_elsewhere(home: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The middleware does not start otherwise."""
     for name, value in (("HOME", home), ("ROS_LOG_DIR", None), ("ROS_HOME", None)):
         monkeypatch.setenv(name, value or "")
         if value is None:
@@ -373,7 +372,6 @@ def command(capsys: Any, *arguments: str) -> tuple[int, str, str]:
 
 @pytest.mark.slow
 def test_a_reader_who_has_had_enough_is_no_error() -> None:
-    """As in `wam model scorecard | head -1`."""
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run(
@@ -519,7 +517,6 @@ def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
 def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
     started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is the only one that is kept: replaced before it is taken, it is a message that a recording lacks."""
     monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=0.2))
     configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
     with Composition(configured, domain_id=domain_id) as composition:
@@ -560,31 +557,46 @@ int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex, co
   static __thread int waits;  // the first of each thread stands for the one during which the clock was set back
   struct timespec later = *until;
   int is_of_wall_clock = until->tv_sec > 1000000000;
-  if (is_of_wall_clock && access(getenv("SET_BACK"), F_OK) == 0 && !waits++) later.tv_sec += 3600;
+  if (is_of_wall_clock && access(getenv("BEGUN"), F_OK) == 0 && !waits++) later.tv_sec += 3600;
   Wait *wait = (Wait *)dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2");  // of this name on x86-64 alone
   return (wait ? wait : (Wait *)dlsym(RTLD_NEXT, "pthread_cond_timedwait"))(condition, mutex, &later);
 }
 """
-TIMER = """
-import os, sys
+ONE_SHOTS = """
+import os
 from wam_ros.run import Connection
 from wam_ros.tolerance import TolerantNode
 came = []
+def begin():
+    timer = node.create_timer(0.005, lambda: (came.append(timer), timer.cancel(), begin()))
 with Connection() as connection:
-    connection.add(TolerantNode("a", context=connection.context)).create_timer(0.005, lambda: came.append(1))
+    node = connection.add(TolerantNode("a", context=connection.context))
+    begin()
     connection.spin(lambda: len(came) > 40)
-    open(os.environ["SET_BACK"], "w").close()
+    open(os.environ["BEGUN"], "w").close()
     connection.spin(lambda: len(came) > 80)
+assert len(set(came)) == len(came)
 """
+
+
+def test_a_process_that_is_held_up_calls_no_timer_twice(tmp_path: Path, domain_id: int) -> None:
+    begun = tmp_path / "begun"
+    with subprocess.Popen([sys.executable, "-c", ONE_SHOTS], env={**os.environ, "BEGUN": str(begun)}) as process:
+        while process.poll() is None:
+            if begun.exists():
+                process.send_signal(signal.SIGSTOP)
+                time.sleep(0.2)
+                process.send_signal(signal.SIGCONT)
+            time.sleep(0.03)
+    assert process.returncode == 0
 
 
 @pytest.mark.skipif(
     shutil.which("cc") is None, reason="without a compiler the clock cannot be set back for one process"
 )
 def test_a_wall_clock_that_is_set_back_stops_no_timer(tmp_path: Path, domain_id: int) -> None:
-    """The wheels of ROS are built against an old C library, whose waits end by the wall clock."""
     source, library = tmp_path / "set_back.c", tmp_path / "set_back.so"
     source.write_text(SET_BACK)
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
-    environment = {**os.environ, "LD_PRELOAD": str(library), "SET_BACK": str(tmp_path / "now")}
-    ran("-c", TIMER, check=True, env=environment, timeout=LONG)
+    environment = {**os.environ, "LD_PRELOAD": str(library), "BEGUN": str(tmp_path / "begun")}
+    ran("-c", ONE_SHOTS, check=True, env=environment, timeout=LONG)

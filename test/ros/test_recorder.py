@@ -575,7 +575,6 @@ def test_a_gap_of_a_second_life_is_not_closed_by_numbers_of_the_first() -> None:
 
 
 def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_path: Path) -> None:
-    """The stack runs on while the recorder stops: the last total is older than the last messages."""
     name = "/wam/motor_states"
     found = machine(tmp_path, name)
     data = bytes(serialize_message(state(1, 0.0)))
@@ -686,7 +685,6 @@ def test_every_message_is_in_the_bag_while_others_come_and_go(arm: RunningArm, m
 def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
     number: int, late: bool, begin: int, tmp_path: Path
 ) -> None:
-    """Its duration, and with that its rates, would count from the start of the run."""
     found = machine(tmp_path, "/wam/robot_description", "/wam/status", "/wam/motor_states", is_late=late)
     found.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
     found.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)

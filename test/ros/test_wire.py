@@ -100,7 +100,6 @@ def test_stamps_are_kept_to_the_nanosecond(stamp: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("topic", ONE_OF_EACH, ids=lambda topic: topic.name)
 def test_a_message_with_one_changed_byte_is_taken_or_refused_alike(topic: Topic) -> None:
-    """Names, frames, counts, sizes, columns, byte order, numbers that are not finite: every byte is one of these."""
     rng = random.Random(SEED)
     arrays = "position velocity effort?"
     decode, reference = decoder(topic, SHARED, arrays), by_objects(topic, arrays)
@@ -124,7 +123,6 @@ def test_a_message_with_one_changed_byte_is_taken_or_refused_alike(topic: Topic)
 @pytest.mark.parametrize("topic", ONE_OF_EACH, ids=lambda topic: topic.name)
 @pytest.mark.parametrize("options", [b"\0\3", b"\x80\0"])
 def test_option_bits_of_the_encapsulation_do_not_change_the_value(topic: Topic, options: bytes) -> None:
-    """The last two count padding at the end; the others are reserved."""
     value = value_of(topic, random.Random(SEED))
     data = encoder(topic, SHARED)(STAMP, value)
     decode = decoder(topic, SHARED, ANY)
