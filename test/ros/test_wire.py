@@ -123,6 +123,7 @@ def test_a_message_with_one_changed_byte_is_taken_or_refused_alike(topic: Topic)
 @pytest.mark.parametrize("topic", ONE_OF_EACH, ids=lambda topic: topic.name)
 @pytest.mark.parametrize("options", [b"\0\3", b"\x80\0"])
 def test_option_bits_of_the_encapsulation_do_not_change_the_value(topic: Topic, options: bytes) -> None:
+    """The last two count padding at the end; the others are reserved."""
     value = value_of(topic, random.Random(SEED))
     data = encoder(topic, SHARED)(STAMP, value)
     decode = decoder(topic, SHARED, ANY)

@@ -202,7 +202,7 @@ def _friction(unit: str, some: Sequence[Piece], window: float) -> tuple[Friction
     )
     static = UNKNOWN
     if law is not None:
-        seen = np.convolve(np.abs(velocity) > rest, np.ones(2 * width + 1), "same") > 2.0 * width  # by the average
+        seen = smoothed(1.0 * (np.abs(velocity) > rest), 2 * width) == 1.0  # by the average
         slowest = int(np.argmin(np.where(seen, np.abs(velocity), math.inf)))
         static = FrictionNumber(dynamic.value + float(np.sign(velocity[slowest]) * law[slowest] @ found.factors[-2:]))
     return Friction(static, dynamic, viscous, UNKNOWN if one_frequency else inertia, *found[4:]), shift * period

@@ -54,7 +54,8 @@ def following_section(recording: AnalysedRecording) -> Section | None:
                     for step in steps
                     if step.swings.verdict in SWINGS_ON
                 ]
-            (sentences if is_like else wrong).extend([f"{name}: {'; '.join(remarks)}."] * bool(remarks))
+            if remarks:
+                (sentences if is_like else wrong).append(f"{name}: {'; '.join(remarks)}.")
             findings += [Finding(f"{name}: {what}", of, value) for what, (value, of) in numbers.items()]
     stated = [*sentences, *wrong]
     return Section("following", "Commands", stated, findings, sentences, wrong) if stated else None
